@@ -1,0 +1,153 @@
+//! Statement of the quadratic programme.
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// Prediction from one sample to the next, x⁺ = A x + B u + d, and what the next state should be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stage<const NX: usize, const NU: usize> {
+    /// System matrix.
+    pub A: SMatrix<f64, NX, NX>,
+    /// Input matrix.
+    pub B: SMatrix<f64, NX, NU>,
+    /// Affine term.
+    pub d: SVector<f64, NX>,
+    /// Reference of the state that this stage leads to.
+    pub x_ref: SVector<f64, NX>,
+}
+
+impl<const NX: usize, const NU: usize> Default for Stage<NX, NU> {
+    fn default() -> Self {
+        Self {
+            A: SMatrix::zeros(),
+            B: SMatrix::zeros(),
+            d: SVector::zeros(),
+            x_ref: SVector::zeros(),
+        }
+    }
+}
+
+/// Tracking problem over `N = stages.len()` samples, with `du_i = u_i - u_(i-1)` and `u_(-1) = u_prev`:
+///
+/// ```text
+/// minimise    sum (i = 1..N)    (x_i - x_ref_i)' W_i (x_i - x_ref_i)  +  soft e_i^2
+///           + sum (i = 0..N-1)  du_i' diag(r) du_i                       (nothing is halved)
+/// subject to  x_(i+1) = A_i x_i + B_i u_i + d_i
+///             u_min <= u_i <= u_max,  |du_i| <= du_max,  |x_i[soft_state]| <= soft_bound + e_i
+/// ```
+///
+/// where `W_i = diag(q)`, and `q_terminal` at `i = N`. A `u_prev` outside of its bounds is moved to the nearest bound first,
+/// so a solution always exists.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Problem<const NX: usize, const NU: usize> {
+    /// Prediction model and references, one element per sample of the horizon.
+    pub stages: Vec<Stage<NX, NU>>,
+    /// State now.
+    pub x_0: SVector<f64, NX>,
+    /// Input that is applied now; the first increment starts from it.
+    pub u_prev: SVector<f64, NU>,
+    /// Weights on the state's errors, none negative.
+    pub q: SVector<f64, NX>,
+    /// Weight on the last state's error, symmetric and positive semidefinite.
+    pub q_terminal: SMatrix<f64, NX, NX>,
+    /// Weights on the input's increments, all positive.
+    pub r: SVector<f64, NU>,
+    /// Lower bound of the input; may be infinite.
+    pub u_min: SVector<f64, NU>,
+    /// Upper bound of the input; may be infinite, may equal the lower one.
+    pub u_max: SVector<f64, NU>,
+    /// Bound of the increment; may be infinite, may be zero.
+    pub du_max: SVector<f64, NU>,
+    /// Index of the state with a soft bound.
+    pub soft_state: usize,
+    /// Bound of that state's magnitude.
+    pub soft_bound: f64,
+    /// Weight on the square by which that state exceeds its bound; zero switches the bound off.
+    pub soft: f64,
+}
+
+impl<const NX: usize, const NU: usize> Problem<NX, NU> {
+    /// Problem of `horizon` samples without weights on the states and without bounds.
+    #[must_use]
+    pub fn new(horizon: usize) -> Self {
+        Self {
+            stages: vec![Stage::default(); horizon],
+            x_0: SVector::zeros(),
+            u_prev: SVector::zeros(),
+            q: SVector::zeros(),
+            q_terminal: SMatrix::zeros(),
+            r: SVector::repeat(1.0),
+            u_min: SVector::repeat(f64::NEG_INFINITY),
+            u_max: SVector::repeat(f64::INFINITY),
+            du_max: SVector::repeat(f64::INFINITY),
+            soft_state: 0,
+            soft_bound: f64::INFINITY,
+            soft: 0.0,
+        }
+    }
+
+    /// The input applied now, moved into its bounds.
+    #[must_use]
+    pub fn u_prev_clamped(&self) -> SVector<f64, NU> {
+        self.u_prev
+            .zip_zip_map(&self.u_min, &self.u_max, |u, lower, upper| {
+                u.max(lower).min(upper)
+            })
+    }
+
+    /// Whether every number makes sense, so that a solution exists: data finite, weights not negative, bounds in order.
+    ///
+    /// `q_terminal` is checked on its diagonal alone; a wrong one elsewhere shows in the outcome of the solve.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        // One sum per stage instead of one branch per number: a NaN or an infinity survives every addition, and finite data
+        // large enough to overflow a sum is no data to solve with either.
+        let stages = self.stages.iter().all(|stage| {
+            (stage.A.sum() + stage.B.sum() + stage.d.sum() + stage.x_ref.sum()).is_finite()
+        });
+        let not_negative = |weight: &f64| *weight >= 0.0 && weight.is_finite();
+        let bounds = (0..NU).all(|j| {
+            self.u_min[j] <= self.u_max[j]
+                && self.u_min[j] < f64::INFINITY
+                && self.u_max[j] > f64::NEG_INFINITY
+                && self.du_max[j] >= 0.0
+                && self.r[j] > 0.0
+                && self.r[j].is_finite()
+        });
+        stages
+            && bounds
+            && !self.stages.is_empty()
+            && (self.x_0.sum() + self.u_prev.sum() + self.q_terminal.sum()).is_finite()
+            && self.q.iter().all(not_negative)
+            && (0..NX).all(|k| self.q_terminal[(k, k)] >= 0.0)
+            && self.soft_state < NX
+            && not_negative(&self.soft)
+            && self.soft_bound >= 0.0
+    }
+
+    /// Cost of a plan; the soft bound's excess is counted with its weight.
+    #[must_use]
+    pub fn cost(&self, x: &[SVector<f64, NX>], u: &[SVector<f64, NU>]) -> f64 {
+        let N = self.stages.len();
+        let mut cost = 0.0;
+        let mut u_prev = self.u_prev_clamped();
+        for i in 0..N {
+            let error = x[i + 1] - self.stages[i].x_ref;
+            cost += if i + 1 == N {
+                error.dot(&(self.q_terminal * error))
+            } else {
+                error.component_mul(&error).dot(&self.q)
+            };
+            let du = u[i] - u_prev;
+            u_prev = u[i];
+            cost += du.component_mul(&du).dot(&self.r) + self.soft * self.excess(&x[i + 1]).powi(2);
+        }
+        cost
+    }
+
+    /// By how much a state exceeds the soft bound, zero when it does not.
+    #[must_use]
+    pub fn excess(&self, x: &SVector<f64, NX>) -> f64 {
+        (x[self.soft_state].abs() - self.soft_bound).max(0.0)
+    }
+}
