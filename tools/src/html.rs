@@ -1,0 +1,90 @@
+//! The frame that all pages of the project share: it follows the reader's light or dark setting and fits a phone.
+
+/// Colours, type and tables.
+const STYLE: &str = "
+:root { color-scheme: light dark; --ink: #1b2733; --soft: #5b6b7a; --paper: #ffffff; --panel: #f4f6f8; --rule: #d7dee5; --accent: #0b63b6; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6ebf0; --soft: #9aa8b5; --paper: #14191f; --panel: #1d242c; --rule: #34404b; --accent: #6cb4ff; } }
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 62rem; padding: 1.5rem 1rem 4rem; font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--paper); }
+h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .5rem; }
+h2 { font-size: 1.25rem; margin: 2.2rem 0 .6rem; }
+h3 { font-size: 1.05rem; margin: 1.6rem 0 .4rem; }
+p, li { max-width: 46rem; }
+a { color: var(--accent); }
+.lead, .note { color: var(--soft); }
+.note { font-size: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .92rem; }
+th, td { text-align: left; vertical-align: top; padding: .35rem .8rem .35rem 0; border-bottom: 1px solid var(--rule); }
+th { color: var(--soft); font-weight: 600; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+code { font: .92em ui-monospace, monospace; }
+pre { background: var(--panel); border-radius: 6px; padding: .8rem 1rem; overflow-x: auto; }
+.plot { width: 100%; height: 22rem; margin: .5rem 0 1rem; }
+@media (max-width: 40rem) { body { padding: 1rem .7rem 3rem; } .plot { height: 17rem; } td, th { padding-right: .5rem; } }
+";
+
+/// A whole document; `head` holds scripts, `body` is markup.
+pub fn document(title: &str, head: &str, body: &str) -> String {
+    let title = escape(title);
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}</title>\n<style>{STYLE}</style>\n{head}</head>\n<body>\n{body}</body>\n</html>\n"
+    )
+}
+
+/// Text as markup that shows this text.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// A table; the columns marked as numbers are set to the right. Cells are markup.
+pub fn table(head: &[(&str, bool)], rows: &[Vec<String>]) -> String {
+    let class = |column: usize| match head.get(column) {
+        Some((_, true)) => " class=\"number\"",
+        _ => "",
+    };
+    let mut markup = String::from("<div class=\"wide\"><table>\n<tr>");
+    for (column, (name, _)) in head.iter().enumerate() {
+        markup.push_str(&format!("<th{}>{}</th>", class(column), escape(name)));
+    }
+    markup.push_str("</tr>\n");
+    for row in rows {
+        markup.push_str("<tr>");
+        for (column, cell) in row.iter().enumerate() {
+            markup.push_str(&format!("<td{}>{cell}</td>", class(column)));
+        }
+        markup.push_str("</tr>\n");
+    }
+    markup.push_str("</table></div>\n");
+    markup
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_become_markup() {
+        assert_eq!(
+            escape("<a href=\"x\"> & co"),
+            "&lt;a href=&quot;x&quot;&gt; &amp; co"
+        );
+    }
+
+    #[test]
+    fn only_number_columns_are_set_to_the_right() {
+        let markup = table(
+            &[("name", false), ("value", true)],
+            &[vec!["m".into(), "1575".into()]],
+        );
+        assert!(
+            markup.contains("<td>m</td><td class=\"number\">1575</td>"),
+            "{markup}"
+        );
+    }
+}
