@@ -1,5 +1,37 @@
-//! Under construction.
+//! Adaptive LPV model predictive control of steering and speed, after [Kebbati].
+//!
+//! The controller holds beliefs about a vehicle (its [`Parameters`]) and a prediction model that is a linear
+//! parameter-varying embedding of the nonlinear single-track equations ([`model`]). Every `t_s` it predicts the measured
+//! state over the latency that stands between measurement and action ([`latency`]), lines the model up along the previous
+//! prediction, discretises it ([`discretise`]), solves one quadratic programme ([`qp`]) and gives the first command of the
+//! optimal plan. [`Controller`] is the whole of it, one communication step at a time.
+//!
+//! Signs: x forward, y left, z up; yaw, steering and curvature positive to the left; `e_y` is the lateral position relative
+//! to the path, positive to the left; `e_psi` is vehicle heading minus path heading. SI units and radians throughout.
+//!
+//! # References
+//!
+//! - \[Kebbati\] Y. Kebbati, N. Ait-Oufroukh, D. Ichalal, V. Vigneron, "RNN-based linear parameter varying adaptive model
+//!   predictive control for autonomous driving". Its printed equations contain errors; where the code differs, the doc
+//!   comment says so.
+//! - \[Rajamani\] R. Rajamani, "Vehicle Dynamics and Control", 2nd ed., Springer 2012: steady-state cornering, section 3.3.
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
 
+pub mod controller;
+pub mod discretise;
+mod error;
+mod ladder;
+pub mod latency;
+pub mod model;
+pub mod mpc;
+pub mod parameters;
+pub mod preview;
 pub mod qp;
+pub mod signals;
+
+pub use controller::Controller;
+pub use error::Error;
+pub use ladder::Status;
+pub use parameters::{Adaptation, Backend, Parameters};
+pub use signals::{Inputs, Output};

@@ -6,9 +6,7 @@
 use super::optimality;
 use super::{Outcome, Problem, Solution};
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT,
-};
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT};
 use nalgebra::{SMatrix, SVector};
 use std::fmt;
 
@@ -62,10 +60,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
     /// Solver with Clarabel's tolerance on gap and feasibility; its own default is 1e-8.
     #[must_use]
     pub fn new(tolerance: f64) -> Self {
-        Self {
-            tolerance,
-            workspace: None,
-        }
+        Self { tolerance, workspace: None }
     }
 
     /// Drops the workspace, so that the next solve builds a new one.
@@ -89,11 +84,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
             Some(mut workspace) => {
                 workspace.data.fill(problem, &scaling);
                 let Data { P, q, A, b } = &workspace.data;
-                if workspace
-                    .solver
-                    .update_data(&P.values, q, &A.values, b)
-                    .is_err()
-                {
+                if workspace.solver.update_data(&P.values, q, &A.values, b).is_err() {
                     solution.outcome = Outcome::Breakdown;
                     return;
                 }
@@ -112,11 +103,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
         self.workspace = Some(workspace);
     }
 
-    fn build(
-        problem: &Problem<NX, NU>,
-        scaling: &Scaling<NX, NU>,
-        tolerance: f64,
-    ) -> Option<Workspace> {
+    fn build(problem: &Problem<NX, NU>, scaling: &Scaling<NX, NU>, tolerance: f64) -> Option<Workspace> {
         let N = problem.stages.len();
         let (columns, rows) = (N * Self::COLUMNS, N * (NX + Self::ROWS));
         let mut data = Data::default();
@@ -128,7 +115,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
             // All three would tie the workspace to the values of its first problem.
             presolve_enable: false,
             input_sparse_dropzeros: false,
-            equilibrate_enable: false,
+            equilibrate_enable: true,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
             tol_feas: tolerance,
@@ -136,12 +123,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
         };
         let cones = [ZeroConeT(N * NX), NonnegativeConeT(N * Self::ROWS)];
         let solver = DefaultSolver::new(&P, &data.q, &A, &data.b, &cones, settings).ok()?;
-        Some(Workspace {
-            horizon: N,
-            soft_state: problem.soft_state,
-            solver,
-            data,
-        })
+        Some(Workspace { horizon: N, soft_state: problem.soft_state, solver, data })
     }
 
     fn read(
@@ -179,7 +161,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
                 let upper = problem.u_max[j].min(u_prev[j] + problem.du_max[j]);
                 solution.u[i][j] = u.max(lower).min(upper);
                 let z = &answer.z[N * NX + i * Self::ROWS..][..Self::ROWS];
-                let unscale = scaling.cost / scaling.u[j];
+                let unscale = 1.0 / (scaling.cost * scaling.u[j]);
                 solution.mu_u[i][j] = (z[j] - z[NU + j]) * unscale;
                 solution.mu_du[i][j] = (z[2 * NU + j] - z[3 * NU + j]) * unscale;
             }
@@ -195,11 +177,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
                 if problem.du_max[j] > 0.0 {
                     solution.mu_u[i][j] = -gradient[j];
                 } else {
-                    let next = if i + 1 < N {
-                        solution.mu_du[i + 1][j]
-                    } else {
-                        0.0
-                    };
+                    let next = if i + 1 < N { solution.mu_du[i + 1][j] } else { 0.0 };
                     solution.mu_du[i][j] = next - gradient[j];
                 }
             }
@@ -214,17 +192,9 @@ impl<const NX: usize, const NU: usize> Scaling<NX, NU> {
         let x = SVector::from_fn(|k, _| {
             let weight = problem.q[k].max(problem.q_terminal[(k, k)]);
             // Beyond a factor of 1e3 from SI units the weight is noise to be left small, not a unit to be adopted.
-            if weight > 0.0 {
-                (1.0 / weight.sqrt()).clamp(1e-3, 1e3)
-            } else {
-                1.0
-            }
+            if weight > 0.0 { (1.0 / weight.sqrt()).clamp(1e-1, 1e1) } else { 1.0 }
         });
-        Self {
-            x,
-            u: SVector::from_fn(|j, _| optimality::span(problem, j)),
-            cost: 1.0,
-        }
+        Self { x, u: SVector::from_fn(|j, _| optimality::span(problem, j)), cost: 1.0 }
     }
 }
 
@@ -246,23 +216,13 @@ impl Columns {
     }
 
     fn to_csc(&self, rows: usize, columns: usize) -> CscMatrix {
-        CscMatrix::new(
-            rows,
-            columns,
-            self.starts.clone(),
-            self.rows.clone(),
-            self.values.clone(),
-        )
+        CscMatrix::new(rows, columns, self.starts.clone(), self.rows.clone(), self.values.clone())
     }
 }
 
 impl Data {
     /// Writes all columns stage by stage.
-    fn fill<const NX: usize, const NU: usize>(
-        &mut self,
-        problem: &Problem<NX, NU>,
-        scaling: &Scaling<NX, NU>,
-    ) {
+    fn fill<const NX: usize, const NU: usize>(&mut self, problem: &Problem<NX, NU>, scaling: &Scaling<NX, NU>) {
         self.P.clear();
         self.q.clear();
         self.A.clear();
@@ -293,32 +253,19 @@ impl Data {
             self.P.push((i - 1) * columns + j, -weight);
             self.q.push(0.0);
         } else {
-            self.q
-                .push(-2.0 * problem.r[j] * su * cost * problem.u_prev_clamped()[j]);
+            self.q.push(-2.0 * problem.r[j] * su * cost * problem.u_prev_clamped()[j]);
         }
         // Every increment but the last one's successor touches the input twice.
-        self.P.push(
-            i * columns + j,
-            if i + 1 < N { 2.0 * weight } else { weight },
-        );
+        self.P.push(i * columns + j, if i + 1 < N { 2.0 * weight } else { weight });
         self.P.end_column();
 
         let fixed = is_fixed(problem, j);
         for k in 0..NX {
-            self.A.push(
-                i * NX + k,
-                unless(fixed, -problem.stages[i].B[(k, j)] * su / scaling.x[k]),
-            );
+            self.A.push(i * NX + k, unless(fixed, -problem.stages[i].B[(k, j)] * su / scaling.x[k]));
         }
         let row = N * NX + i * rows;
-        self.A.push(
-            row + j,
-            unless(fixed || problem.u_max[j].is_infinite(), 1.0),
-        );
-        self.A.push(
-            row + NU + j,
-            unless(fixed || problem.u_min[j].is_infinite(), -1.0),
-        );
+        self.A.push(row + j, unless(fixed || problem.u_max[j].is_infinite(), 1.0));
+        self.A.push(row + NU + j, unless(fixed || problem.u_min[j].is_infinite(), -1.0));
         let du = unless(fixed || problem.du_max[j].is_infinite(), 1.0);
         self.A.push(row + 2 * NU + j, du);
         self.A.push(row + 3 * NU + j, -du);
@@ -347,19 +294,16 @@ impl Data {
         } else {
             let W = &problem.q_terminal;
             for l in 0..=k {
-                self.P
-                    .push(column + l, 2.0 * W[(l, k)] * sx[l] * sx[k] * cost);
+                self.P.push(column + l, 2.0 * W[(l, k)] * sx[l] * sx[k] * cost);
             }
-            self.q
-                .push(-2.0 * (0..NX).map(|l| W[(l, k)] * x_ref[l]).sum::<f64>() * sx[k] * cost);
+            self.q.push(-2.0 * (0..NX).map(|l| W[(l, k)] * x_ref[l]).sum::<f64>() * sx[k] * cost);
         }
         self.P.end_column();
 
         self.A.push(i * NX + k, 1.0);
         if let Some(next) = problem.stages.get(i + 1) {
             for l in 0..NX {
-                self.A
-                    .push((i + 1) * NX + l, -next.A[(l, k)] * sx[k] / sx[l]);
+                self.A.push((i + 1) * NX + l, -next.A[(l, k)] * sx[k] / sx[l]);
             }
         }
         if k == problem.soft_state {
@@ -377,18 +321,15 @@ impl Data {
         scaling: &Scaling<NX, NU>,
         i: usize,
     ) {
-        let unit = scaling.x[problem.soft_state];
         let on = has_soft_bound(problem);
-        let weight = if on { problem.soft } else { 1.0 };
-        self.P.push(
-            i * (NX + NU + 1) + NX + NU,
-            2.0 * weight * unit * unit * scaling.cost,
-        );
+        // The slack's unit is the one in which its weight is one.
+        let unit = unless(!on, 1.0 / (problem.soft.sqrt() * scaling.x[problem.soft_state]));
+        self.P.push(i * (NX + NU + 1) + NX + NU, 2.0 * scaling.cost);
         self.P.end_column();
         self.q.push(0.0);
         let row = problem.stages.len() * NX + i * (4 * NU + 2) + 4 * NU;
-        self.A.push(row, unless(!on, -1.0));
-        self.A.push(row + 1, unless(!on, -1.0));
+        self.A.push(row, -unit);
+        self.A.push(row + 1, -unit);
         self.A.end_column();
     }
 
@@ -409,25 +350,15 @@ impl Data {
             self.b.extend(known.component_div(&scaling.x).iter());
         }
         let bound = |j: usize, value: f64| {
-            if is_fixed(problem, j) || value.is_infinite() {
-                1.0
-            } else {
-                value / scaling.u[j]
-            }
+            if is_fixed(problem, j) || value.is_infinite() { 1.0 } else { value / scaling.u[j] }
         };
-        let soft_bound = if has_soft_bound(problem) {
-            problem.soft_bound / scaling.x[problem.soft_state]
-        } else {
-            1.0
-        };
+        let soft_bound = if has_soft_bound(problem) { problem.soft_bound / scaling.x[problem.soft_state] } else { 1.0 };
         for i in 0..problem.stages.len() {
             let before = if i == 0 { u_prev } else { SVector::zeros() };
             self.b.extend((0..NU).map(|j| bound(j, problem.u_max[j])));
             self.b.extend((0..NU).map(|j| bound(j, -problem.u_min[j])));
-            self.b
-                .extend((0..NU).map(|j| bound(j, problem.du_max[j] + before[j])));
-            self.b
-                .extend((0..NU).map(|j| bound(j, problem.du_max[j] - before[j])));
+            self.b.extend((0..NU).map(|j| bound(j, problem.du_max[j] + before[j])));
+            self.b.extend((0..NU).map(|j| bound(j, problem.du_max[j] - before[j])));
             self.b.extend([soft_bound; 2]);
         }
     }
@@ -456,8 +387,6 @@ impl<const NX: usize, const NU: usize> Clone for Clarabel<NX, NU> {
 
 impl<const NX: usize, const NU: usize> fmt::Debug for Clarabel<NX, NU> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Clarabel")
-            .field("tolerance", &self.tolerance)
-            .finish_non_exhaustive()
+        f.debug_struct("Clarabel").field("tolerance", &self.tolerance).finish_non_exhaustive()
     }
 }

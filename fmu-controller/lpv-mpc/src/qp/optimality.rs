@@ -4,20 +4,13 @@ use super::{Problem, Solution};
 use nalgebra::SVector;
 
 /// Sets the costates of a plan: λ_N = 2 W_N (x_N - x_ref_N) + soft term, λ_i = A_i' λ_(i+1) + 2 W_i (x_i - x_ref_i) + soft term.
-pub fn costates<const NX: usize, const NU: usize>(
-    problem: &Problem<NX, NU>,
-    solution: &mut Solution<NX, NU>,
-) {
+pub fn costates<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
     let N = problem.stages.len();
     let k = problem.soft_state;
     for i in (0..N).rev() {
         let x = &solution.x[i + 1];
         let error = x - problem.stages[i].x_ref;
-        let mut lambda = if i + 1 == N {
-            problem.q_terminal * error
-        } else {
-            problem.q.component_mul(&error)
-        };
+        let mut lambda = if i + 1 == N { problem.q_terminal * error } else { problem.q.component_mul(&error) };
         lambda *= 2.0;
         if problem.soft > 0.0 {
             lambda[k] += 2.0 * problem.soft * problem.excess(x).copysign(x[k]);
@@ -40,20 +33,12 @@ pub fn gradient<const NX: usize, const NU: usize>(
     let N = problem.stages.len();
     let B = &problem.stages[i].B;
     let u = &solution.u;
-    let u_before = if i == 0 {
-        problem.u_prev_clamped()
-    } else {
-        u[i - 1]
-    };
+    let u_before = if i == 0 { problem.u_prev_clamped() } else { u[i - 1] };
     let mut gradient = SVector::zeros();
     let mut scale = SVector::zeros();
     for j in 0..NU {
         let du = 2.0 * problem.r[j] * (u[i][j] - u_before[j]);
-        let du_next = if i + 1 < N {
-            2.0 * problem.r[j] * (u[i + 1][j] - u[i][j])
-        } else {
-            0.0
-        };
+        let du_next = if i + 1 < N { 2.0 * problem.r[j] * (u[i + 1][j] - u[i][j]) } else { 0.0 };
         let mut along_dynamics = 0.0;
         let mut magnitude = du.abs() + du_next.abs();
         let mut curvature = 2.0 * problem.r[j];
@@ -74,11 +59,7 @@ pub fn gradient<const NX: usize, const NU: usize>(
 #[must_use]
 pub fn span<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize) -> f64 {
     let span = problem.u_max[j] - problem.u_min[j];
-    if span.is_finite() && span > 0.0 {
-        span
-    } else {
-        1.0
-    }
+    if span.is_finite() && span > 0.0 { span } else { 1.0 }
 }
 
 /// Largest violation of the conditions of optimality, each made dimensionless: stationarity by the scale of [`gradient`],
@@ -86,10 +67,7 @@ pub fn span<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usiz
 ///
 /// Costates must be those of the plan ([`costates`]) and the states must follow from the inputs.
 #[must_use]
-pub fn residual<const NX: usize, const NU: usize>(
-    problem: &Problem<NX, NU>,
-    solution: &Solution<NX, NU>,
-) -> f64 {
+pub fn residual<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, solution: &Solution<NX, NU>) -> f64 {
     let N = problem.stages.len();
     let mut worst: f64 = 0.0;
     let mut u_prev = problem.u_prev_clamped();
@@ -97,11 +75,7 @@ pub fn residual<const NX: usize, const NU: usize>(
         let u = solution.u[i];
         let (gradient, scale) = gradient(problem, solution, i);
         for j in 0..NU {
-            let mu_du_next = if i + 1 < N {
-                solution.mu_du[i + 1][j]
-            } else {
-                0.0
-            };
+            let mu_du_next = if i + 1 < N { solution.mu_du[i + 1][j] } else { 0.0 };
             let (mu_u, mu_du) = (solution.mu_u[i][j], solution.mu_du[i][j]);
             let span = span(problem, j);
             let stationarity = (gradient[j] + mu_u + mu_du - mu_du_next).abs() / scale[j];
@@ -117,11 +91,8 @@ pub fn residual<const NX: usize, const NU: usize>(
                 let slack = if mu > 0.0 { -upper } else { -lower };
                 (mu.abs() / scale[j]).min(slack.abs() / span)
             };
-            let complementarity = gap(mu_u, above, below).max(gap(
-                mu_du,
-                du - problem.du_max[j],
-                -du - problem.du_max[j],
-            ));
+            let complementarity =
+                gap(mu_u, above, below).max(gap(mu_du, du - problem.du_max[j], -du - problem.du_max[j]));
             worst = worst.max(stationarity).max(violation).max(complementarity);
         }
         u_prev = u;

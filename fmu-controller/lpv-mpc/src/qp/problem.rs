@@ -18,12 +18,7 @@ pub struct Stage<const NX: usize, const NU: usize> {
 
 impl<const NX: usize, const NU: usize> Default for Stage<NX, NU> {
     fn default() -> Self {
-        Self {
-            A: SMatrix::zeros(),
-            B: SMatrix::zeros(),
-            d: SVector::zeros(),
-            x_ref: SVector::zeros(),
-        }
+        Self { A: SMatrix::zeros(), B: SMatrix::zeros(), d: SVector::zeros(), x_ref: SVector::zeros() }
     }
 }
 
@@ -89,10 +84,7 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
     /// The input applied now, moved into its bounds.
     #[must_use]
     pub fn u_prev_clamped(&self) -> SVector<f64, NU> {
-        self.u_prev
-            .zip_zip_map(&self.u_min, &self.u_max, |u, lower, upper| {
-                u.max(lower).min(upper)
-            })
+        self.u_prev.zip_zip_map(&self.u_min, &self.u_max, |u, lower, upper| u.max(lower).min(upper))
     }
 
     /// Whether every number makes sense, so that a solution exists: data finite, weights not negative, bounds in order.
@@ -102,9 +94,10 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
     pub fn is_valid(&self) -> bool {
         // One sum per stage instead of one branch per number: a NaN or an infinity survives every addition, and finite data
         // large enough to overflow a sum is no data to solve with either.
-        let stages = self.stages.iter().all(|stage| {
-            (stage.A.sum() + stage.B.sum() + stage.d.sum() + stage.x_ref.sum()).is_finite()
-        });
+        let stages = self
+            .stages
+            .iter()
+            .all(|stage| (stage.A.sum() + stage.B.sum() + stage.d.sum() + stage.x_ref.sum()).is_finite());
         let not_negative = |weight: &f64| *weight >= 0.0 && weight.is_finite();
         let bounds = (0..NU).all(|j| {
             self.u_min[j] <= self.u_max[j]

@@ -1,0 +1,172 @@
+//! The controller as its importer sees it: measurements in, commands out, one communication step at a time.
+
+use serde::{Deserialize, Serialize};
+
+use crate::discretise::Hold;
+use crate::ladder::{Status, safe_stop};
+use crate::latency::{Latency, Predicted};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, Tyres, V_X, V_Y, YAW_RATE};
+use crate::mpc::{Mpc, NX_LAGS, vehicle_part};
+use crate::parameters::HORIZON_MAX;
+use crate::signals::{Inputs, Output};
+use crate::{Error, Parameters};
+
+/// Fraction of a period by which times may differ and still be one: importers add up steps in floating point.
+const SAME_SAMPLE: f64 = 1e-6;
+
+/// The predictive controller in the dimension that the actuators ask for.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+enum Core {
+    Ideal(Box<Mpc<NX>>),
+    Lags(Box<Mpc<NX_LAGS>>),
+}
+
+macro_rules! with_mpc {
+    ($core:expr, $mpc:ident => $body:expr) => {
+        match $core {
+            Core::Ideal($mpc) => $body,
+            Core::Lags($mpc) => $body,
+        }
+    };
+}
+
+/// What the controller holds to be true, derived from its parameters.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Beliefs {
+    body: Body,
+    tyres: Tyres,
+    disturbance: Disturbance,
+}
+
+/// Adaptive LPV-MPC of steering and speed.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Controller {
+    parameters: Parameters,
+    beliefs: Beliefs,
+    core: Core,
+    latency: Latency,
+    /// Time of the first sample [s].
+    start: f64,
+    /// Samples taken.
+    samples: u64,
+    /// The command that was given last.
+    u_prev: Input,
+    output: Output,
+}
+
+impl Controller {
+    /// A controller whose first sample is at time `start` [s], wheels straight.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] names the first parameter outside its range.
+    pub fn new(parameters: Parameters, start: f64) -> Result<Self, Error> {
+        parameters.validate()?;
+        let p = &parameters;
+        let tau = [p.tau_delta, p.tau_a_x];
+        let tyres = p.nominal_tyres();
+        Ok(Self {
+            beliefs: Beliefs { body: p.body(), tyres, disturbance: Disturbance::zeros() },
+            core: if tau == [0.0, 0.0] {
+                Core::Ideal(Box::new(Mpc::new(p)))
+            } else {
+                Core::Lags(Box::new(Mpc::new(p)))
+            },
+            latency: Latency::new(start, p.input_delay, tau, p.t_s),
+            start,
+            samples: 0,
+            u_prev: Input::zeros(),
+            output: Output::initial(&tyres),
+            parameters,
+        })
+    }
+
+    /// The parameters in force.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Changes weights and bounds between steps; what shapes the controller (horizon, period, delays) must stay.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] names the first parameter outside its range; nothing is changed then.
+    pub fn tune(&mut self, parameters: &Parameters) -> Result<(), Error> {
+        parameters.validate()?;
+        self.parameters.clone_from(parameters);
+        self.beliefs.body = parameters.body();
+        self.beliefs.tyres = parameters.nominal_tyres();
+        with_mpc!(&mut self.core, mpc => mpc.tune(parameters));
+        Ok(())
+    }
+
+    /// What is visible now.
+    pub fn output(&self) -> &Output {
+        &self.output
+    }
+
+    /// One communication step from time `t` [s] over `h` [s], with what was measured at `t`.
+    ///
+    /// Takes every sample that falls into the step. The command of the last one is visible afterwards, at `t + h`, and the
+    /// plan is made for that moment (and the actuators' delay).
+    ///
+    /// # Errors
+    /// [`Error::Step`] for a step that is not positive and finite; the controller is as before then.
+    pub fn advance(&mut self, t: f64, h: f64, inputs: &Inputs) -> Result<(), Error> {
+        if !(h > 0.0 && h.is_finite() && t.is_finite()) {
+            return Err(Error::Step(h));
+        }
+        self.latency.advance(t);
+        let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);
+        while self.start + self.samples as f64 * self.parameters.t_s < end {
+            self.samples += 1;
+            self.sample(h, inputs);
+            self.latency.send(t + h, self.u_prev);
+        }
+        Ok(())
+    }
+
+    /// One sample: predict over the latency, plan, take the first command.
+    fn sample(&mut self, h: f64, inputs: &Inputs) {
+        let Self { parameters: p, beliefs, .. } = self;
+        let Beliefs { body, tyres, disturbance } = &*beliefs;
+        let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
+        let at: Predicted =
+            self.latency.predict(&inputs.state(), h, |s| inputs.curvature(s / p.t_s), body, tyres, disturbance);
+        let reference = inputs.reference((h + p.input_delay) / p.t_s);
+        let u_prev = self.u_prev;
+        let (status, command) = with_mpc!(&mut self.core, mpc => {
+            let outcome = mpc.step(&at, &u_prev, &reference, &hold, body, tyres, disturbance);
+            // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
+            if mpc.plan.is_left() {
+                (Status::of(outcome), mpc.plan.u[0])
+            } else {
+                (Status::SafeStop, safe_stop(&u_prev, inputs.v_x, p))
+            }
+        });
+        self.u_prev = command;
+        self.publish(status);
+    }
+
+    fn publish(&mut self, status: Status) {
+        let Self { output, .. } = self;
+        output.delta = self.u_prev[DELTA];
+        output.a_x = self.u_prev[A_X];
+        output.c_f = self.beliefs.tyres.c_f;
+        output.c_r = self.beliefs.tyres.c_r;
+        output.status = status;
+        with_mpc!(&self.core, mpc => {
+            (output.iterations, output.kkt_residual, output.slack_e_y) = mpc.diagnostics();
+            let last = mpc.plan.u.len() - 1;
+            for i in 0..HORIZON_MAX {
+                let x = vehicle_part(&mpc.plan.x[i.min(last) + 1]);
+                let u = &mpc.plan.u[i.min(last)];
+                output.e_y_pred[i] = x[E_Y];
+                output.e_psi_pred[i] = x[E_PSI];
+                output.v_x_pred[i] = x[V_X];
+                output.v_y_pred[i] = x[V_Y];
+                output.yaw_rate_pred[i] = x[YAW_RATE];
+                output.delta_pred[i] = u[DELTA];
+                output.a_x_pred[i] = u[A_X];
+            }
+        });
+    }
+}

@@ -1,0 +1,230 @@
+//! What happens between a measurement and the action of the command that it leads to.
+//!
+//! A co-simulation importer shows a command at the end of the step that begins at the measurement, and the actuators add
+//! their own delay. Until then the car is driven by commands that are already on their way. [`Latency`] remembers them,
+//! follows the actuators' lags, and moves the measured state on to the moment at which the next command acts.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::{A_X, Body, DELTA, Disturbance, Input, NU, State, Tyres, derivative};
+
+/// Longest integration step of the prediction [s].
+///
+/// A third of the paper's period: the fastest mode of the model (about 40 1/s at the guarded speed) then leaves
+/// (0.44)^5 / 5! = 1.4e-4 of its amplitude a step, and the usual ones a hundred times less.
+const STEP_MAX: f64 = 0.011;
+
+/// Times closer than this are one [s]: importers add up steps in floating point.
+const SAME_TIME: f64 = 1e-9;
+
+/// Commands on their way and the state of the actuators.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Latency {
+    /// Delay of the actuators [s].
+    delay: f64,
+    /// Time constants of the actuators [s].
+    tau: [f64; NU],
+    /// Commands and the times at which they begin to act, oldest first [s].
+    commands: Vec<(f64, Input)>,
+    /// What the actuators deliver.
+    actual: Input,
+    /// Time to which `actual` belongs [s].
+    time: f64,
+}
+
+/// A predicted state with what the actuators deliver then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predicted {
+    /// Vehicle state.
+    pub x: State,
+    /// Actual steering angle [rad] and acceleration [m/s2].
+    pub actual: Input,
+}
+
+impl Latency {
+    /// No command yet, actuators at rest at time `start` [s]; `period` [s] bounds how many commands can be on their way.
+    pub fn new(start: f64, delay: f64, tau: [f64; NU], period: f64) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a delay of at most 1 s in periods"
+        )]
+        let on_their_way = (delay / period).ceil() as usize;
+        Self {
+            delay,
+            tau,
+            // One acts, one has just been given, one rounds.
+            commands: Vec::with_capacity(on_their_way + 3),
+            actual: Input::zeros(),
+            time: start,
+        }
+    }
+
+    /// A command becomes visible at time `t` [s].
+    pub fn send(&mut self, t: f64, command: Input) {
+        let acts = t + self.delay;
+        // A sample within the same communication step replaces what nobody has seen yet.
+        if let Some(last) = self.commands.last_mut().filter(|(time, _)| *time >= acts - SAME_TIME) {
+            *last = (acts, command);
+        } else {
+            self.commands.push((acts, command));
+        }
+    }
+
+    /// Moves the actuators on to time `t` [s] and forgets commands that no longer matter.
+    pub fn advance(&mut self, t: f64) {
+        let mut now = self.time;
+        while now < t - SAME_TIME {
+            let (command, until) = self.acting(now);
+            let next = until.min(t);
+            self.actual = lag(&self.actual, &command, next - now, &self.tau);
+            now = next;
+        }
+        self.time = t;
+        let acting = self.commands.iter().rposition(|(acts, _)| *acts <= t + SAME_TIME);
+        self.commands.drain(..acting.unwrap_or(0));
+    }
+
+    /// The command that acts at time `t` [s] and the time at which the next one takes over [s].
+    fn acting(&self, t: f64) -> (Input, f64) {
+        let next = self.commands.partition_point(|(acts, _)| *acts <= t + SAME_TIME);
+        let command = match next {
+            0 => Input::zeros(),
+            _ => self.commands[next - 1].1,
+        };
+        (command, self.commands.get(next).map_or(f64::INFINITY, |(acts, _)| *acts))
+    }
+
+    /// Moves the state `x`, measured at the time of the last [`advance`](Self::advance), on by `step` [s] and the delay.
+    ///
+    /// `kappa` gives the curvature [1/m] at a time after the measurement [s].
+    pub fn predict(
+        &self,
+        x: &State,
+        step: f64,
+        kappa: impl Fn(f64) -> f64,
+        body: &Body,
+        tyres: &Tyres,
+        disturbance: &Disturbance,
+    ) -> Predicted {
+        let end = self.time + step + self.delay;
+        let mut at = Predicted { x: *x, actual: self.actual };
+        let mut now = self.time;
+        while now < end - SAME_TIME {
+            let (command, until) = self.acting(now);
+            let piece = until.min(end) - now;
+            let steps = (piece / STEP_MAX - SAME_TIME).ceil().max(1.0);
+            let h = piece / steps;
+            let mut done = 0.0;
+            while done < steps {
+                let t = now - self.time + done * h;
+                at = self.runge_kutta(&at, &command, h, |s| kappa(t + s), body, tyres, disturbance);
+                done += 1.0;
+            }
+            now += piece;
+        }
+        at
+    }
+
+    /// One classic Runge-Kutta step of the nonlinear model behind the lags.
+    #[expect(clippy::too_many_arguments, reason = "the model's arguments, a command and a step")]
+    fn runge_kutta(
+        &self,
+        at: &Predicted,
+        command: &Input,
+        h: f64,
+        kappa: impl Fn(f64) -> f64,
+        body: &Body,
+        tyres: &Tyres,
+        disturbance: &Disturbance,
+    ) -> Predicted {
+        let middle = lag(&at.actual, command, h / 2.0, &self.tau);
+        let end = lag(&at.actual, command, h, &self.tau);
+        // Without a lag the command acts from the first moment on.
+        let start = lag(&at.actual, command, 0.0, &self.tau);
+        let f = |x: &State, u: &Input, s: f64| derivative(x, u, kappa(s), body, tyres, disturbance);
+        let k1 = f(&at.x, &start, 0.0);
+        let k2 = f(&(at.x + k1 * (h / 2.0)), &middle, h / 2.0);
+        let k3 = f(&(at.x + k2 * (h / 2.0)), &middle, h / 2.0);
+        let k4 = f(&(at.x + k3 * h), &end, h);
+        Predicted { x: at.x + (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0), actual: end }
+    }
+}
+
+/// First-order lags over `h` [s], exact for a held command.
+fn lag(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Input {
+    let follow = |j: usize| {
+        if tau[j] > 0.0 { command[j] + (actual[j] - command[j]) * (-h / tau[j]).exp() } else { command[j] }
+    };
+    Input::from([follow(DELTA), follow(A_X)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameters;
+
+    fn predict(latency: &Latency, step: f64) -> Predicted {
+        let p = Parameters::default();
+        let x = State::from([15.0, 0.1, 0.05, 0.2, 0.02]);
+        latency.predict(&x, step, |_| 0.01, &p.body(), &p.nominal_tyres(), &Disturbance::zeros())
+    }
+
+    #[test]
+    fn a_delay_shifts_when_commands_act() {
+        let mut latency = Latency::new(0.0, 0.05, [0.0; 2], 0.033);
+        latency.send(0.001, Input::from([0.1, 1.0]));
+        assert_eq!(latency.acting(0.050).0, Input::zeros());
+        assert_eq!(latency.acting(0.051).0, Input::from([0.1, 1.0]));
+        latency.send(0.034, Input::from([0.2, 2.0]));
+        latency.advance(0.09);
+        assert_eq!(latency.acting(0.09).0, Input::from([0.2, 2.0]));
+        assert_eq!(latency.commands.len(), 1);
+    }
+
+    #[test]
+    fn prediction_in_one_go_equals_prediction_in_pieces() {
+        let p = Parameters::default();
+        let mut latency = Latency::new(0.0, 0.066, [0.1, 0.2], 0.033);
+        latency.send(0.0, Input::from([0.05, 1.0]));
+        latency.send(0.033, Input::from([0.03, -1.0]));
+        latency.advance(0.033);
+        let whole = predict(&latency, 0.033);
+        let mut later = latency.clone();
+        later.advance(0.066);
+        // A step that takes back half of the delay ends half-way.
+        let half = latency.predict(
+            &State::from([15.0, 0.1, 0.05, 0.2, 0.02]),
+            -0.033,
+            |_| 0.01,
+            &p.body(),
+            &p.nominal_tyres(),
+            &Disturbance::zeros(),
+        );
+        let rest = later.predict(&half.x, 0.0, |_| 0.01, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
+        assert!((rest.x - whole.x).norm() < 1e-12, "{} {}", rest.x, whole.x);
+        assert!((rest.actual - whole.actual).norm() < 1e-12);
+    }
+
+    #[test]
+    fn prediction_follows_the_lag_in_closed_form() {
+        let mut latency = Latency::new(0.0, 0.0, [0.1, 0.3], 0.033);
+        latency.send(0.0, Input::from([0.05, 2.0]));
+        let at = predict(&latency, 0.2);
+        let expected = Input::from([0.05 * (1.0 - (-2.0f64).exp()), 2.0 * (1.0 - (-0.2f64 / 0.3).exp())]);
+        assert!((at.actual - expected).norm() < 1e-14, "{} {expected}", at.actual);
+    }
+
+    #[test]
+    fn speed_under_a_lagged_acceleration_is_analytic() {
+        // Straight, no drag, no rolling resistance: v = v_0 + a (t - tau (1 - exp(-t / tau))).
+        let p = Parameters { c_d: 0.0, c_rr: 0.0, ..Parameters::default() };
+        let mut latency = Latency::new(0.0, 0.0, [0.0, 0.3], 0.033);
+        latency.send(0.0, Input::from([0.0, 2.0]));
+        let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
+        let at = latency.predict(&x, 0.2, |_| 0.0, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
+        let expected = 15.0 + 2.0 * (0.2 - 0.3 * (1.0 - (-0.2f64 / 0.3).exp()));
+        // Simpson's rule on an exponential, 11 ms steps: (h / tau)^4 / 2880.
+        assert!((at.x[0] - expected).abs() < 1e-9, "{} {expected}", at.x[0]);
+    }
+}

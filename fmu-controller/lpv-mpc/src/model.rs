@@ -1,0 +1,294 @@
+//! The prediction model: nonlinear single-track equations in path coordinates and their exact LPV embedding.
+//!
+//! [`derivative`] states the equations of motion, [`embed`] writes the same right-hand side as `A(psi) x + B(psi) u + d`.
+//! The two agree to rounding for every state and for any tyre whose axle force is written `F = F_0 + C alpha`: a secant
+//! stiffness has `F_0 = 0`, a tangent model carries the rest of the force in `F_0`.
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// Number of vehicle states.
+pub const NX: usize = 5;
+/// Number of inputs.
+pub const NU: usize = 2;
+
+/// Index of the longitudinal velocity [m/s].
+pub const V_X: usize = 0;
+/// Index of the lateral velocity [m/s].
+pub const V_Y: usize = 1;
+/// Index of the yaw rate [rad/s].
+pub const YAW_RATE: usize = 2;
+/// Index of the lateral error [m].
+pub const E_Y: usize = 3;
+/// Index of the heading error [rad].
+pub const E_PSI: usize = 4;
+/// Index of the front steering angle in the input [rad].
+pub const DELTA: usize = 0;
+/// Index of the longitudinal acceleration in the input [m/s2].
+pub const A_X: usize = 1;
+
+/// State `[v_x, v_y, yaw_rate, e_y, e_psi]`.
+pub type State = SVector<f64, NX>;
+/// Input `[delta, a_x]`.
+pub type Input = SVector<f64, NU>;
+
+/// Speed below which slip angles are taken as if the car moved this fast [m/s].
+///
+/// Slip is undefined at standstill ([Kebbati] adds an unvalued epsilon to some of its terms). Dividing by
+/// `max(v_x, V_GUARD)` bounds the rate of the lateral modes, and scaling the steering by the same ratio keeps the
+/// kinematic bicycle as the steady state: at rest steering moves nothing. 3 m/s keeps the fastest mode of the stiffest tyre
+/// preset (about 40 1/s) resolvable by the fourth-order discretisation at a period of 33 ms.
+pub const V_GUARD: f64 = 3.0;
+
+/// Smallest value of `1 - kappa e_y`: closer to the centre of curvature the path coordinates lose their meaning.
+const PATH_FACTOR_MIN: f64 = 0.1;
+
+/// What the controller believes about the car's body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Body {
+    /// Mass [kg].
+    pub m: f64,
+    /// Yaw inertia [kg m2].
+    pub i_z: f64,
+    /// Distance from the centre of gravity to the front axle [m].
+    pub l_f: f64,
+    /// Distance from the centre of gravity to the rear axle [m].
+    pub l_r: f64,
+    /// Drag per squared speed, `rho C_d A / 2` [kg/m].
+    pub drag: f64,
+    /// Rolling deceleration, `c_rr g` [m/s2].
+    pub rolling: f64,
+}
+
+/// Axle forces as affine functions of the slip angles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tyres {
+    /// Front cornering stiffness [N/rad].
+    pub c_f: f64,
+    /// Rear cornering stiffness [N/rad].
+    pub c_r: f64,
+    /// Front lateral force at zero slip of the affine model; 0 for a secant stiffness [N].
+    pub f_f0: f64,
+    /// Rear lateral force at zero slip of the affine model; 0 for a secant stiffness [N].
+    pub f_r0: f64,
+}
+
+impl Tyres {
+    /// Secant stiffnesses: forces proportional to slip.
+    pub fn secant(c_f: f64, c_r: f64) -> Self {
+        Self { c_f, c_r, f_f0: 0.0, f_r0: 0.0 }
+    }
+}
+
+/// Accelerations that the model cannot explain: `[m/s2, m/s2, rad/s2]` on `v_x`, `v_y` and `yaw_rate`.
+pub type Disturbance = SVector<f64, 3>;
+
+/// The linear system `x' = A x + B u + d` at one scheduling point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lpv {
+    /// System matrix.
+    pub A: SMatrix<f64, NX, NX>,
+    /// Input matrix.
+    pub B: SMatrix<f64, NX, NU>,
+    /// Affine term: forces at zero slip and disturbances.
+    pub d: State,
+}
+
+/// Guarded speed of the slip angles, and the ratio of true to guarded speed that scales the steering.
+fn guarded(v_x: f64) -> (f64, f64) {
+    let v = v_x.max(V_GUARD);
+    (v, v_x / v)
+}
+
+/// `1 - kappa e_y`, held away from zero.
+fn path_factor(kappa: f64, e_y: f64) -> f64 {
+    (1.0 - kappa * e_y).max(PATH_FACTOR_MIN)
+}
+
+/// Front and rear slip angles [rad], [Kebbati, eq. (2)] with the signs of the yaw terms corrected.
+pub fn slip_angles(x: &State, delta: f64, body: &Body) -> (f64, f64) {
+    let (v, ratio) = guarded(x[V_X]);
+    (delta * ratio - ((x[V_Y] + body.l_f * x[YAW_RATE]) / v).atan(), -((x[V_Y] - body.l_r * x[YAW_RATE]) / v).atan())
+}
+
+/// Right-hand side of the prediction model, [Kebbati, eq. (1)] corrected.
+///
+/// Differs from the printed equations in the signs of the slip angles, the factor `kappa` and the signs in `e_psi'`, and
+/// rolling resistance that is `c_rr m g` instead of the tyre's friction times the weight.
+pub fn derivative(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, disturbance: &Disturbance) -> State {
+    let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
+    let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
+    let (v, _) = guarded(v_x);
+    let (alpha_f, alpha_r) = slip_angles(x, u[DELTA], body);
+    let f_yf = tyres.f_f0 + tyres.c_f * alpha_f;
+    let f_yr = tyres.f_r0 + tyres.c_r * alpha_r;
+    let (s, c) = u[DELTA].sin_cos();
+    let (s_psi, c_psi) = e_psi.sin_cos();
+
+    State::from([
+        u[A_X] + yaw_rate * v_y - f_yf * s / m - rolling * v_x / v - drag * v_x.abs() * v_x / m + disturbance[0],
+        (f_yf * c + f_yr) / m - yaw_rate * v_x + disturbance[1],
+        (l_f * f_yf * c - l_r * f_yr) / i_z + disturbance[2],
+        v_x * s_psi + v_y * c_psi,
+        yaw_rate - kappa * (v_x * c_psi - v_y * s_psi) / path_factor(kappa, e_y),
+    ])
+}
+
+/// `atan(z) / z`, 1 at zero.
+fn atan_ratio(z: f64) -> f64 {
+    // Below 1e-4 the first neglected term of the series, z^4 / 5, is under the rounding of 1.
+    if z.abs() < 1e-4 { 1.0 - z * z / 3.0 } else { z.atan() / z }
+}
+
+/// `sin(x) / x` from the sine of `x`, 1 at zero.
+fn sinc(x: f64, sin_x: f64) -> f64 {
+    // Below 1e-4 the first neglected term of the series, x^4 / 120, is under the rounding of 1.
+    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { sin_x / x }
+}
+
+/// The LPV embedding at the scheduling point `(x, u, kappa)`, [Kebbati, eqs. (6) to (8)] corrected.
+///
+/// Exact: `A x + B u + d` at the scheduling point equals [`derivative`]. Differs from the printed matrices in the signs of
+/// `A52`, `B21`, `B31` and of the rear term in `A32`, in the misplaced cosines of `A32` and `A33`, and in the lateral
+/// error's row: the printed `A41 = sin e_psi` with `A45 = 0` makes (A, B) uncontrollable, `A45 = v_x sinc e_psi` does not.
+pub fn embed(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, disturbance: &Disturbance) -> Lpv {
+    let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
+    let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
+    let Tyres { c_f, c_r, f_f0, f_r0 } = *tyres;
+    let (v, ratio) = guarded(v_x);
+    let (s, c) = u[DELTA].sin_cos();
+    let (s_psi, c_psi) = e_psi.sin_cos();
+    // Stiffness per metre per second of lateral velocity at the axle.
+    let k_f = c_f * atan_ratio((v_y + l_f * yaw_rate) / v) / v;
+    let k_r = c_r * atan_ratio((v_y - l_r * yaw_rate) / v) / v;
+    let k_path = kappa / path_factor(kappa, e_y);
+
+    let mut A = SMatrix::<f64, NX, NX>::zeros();
+    A[(V_X, V_X)] = -rolling / v - drag * v_x.abs() / m;
+    A[(V_X, V_Y)] = k_f * s / m;
+    A[(V_X, YAW_RATE)] = k_f * l_f * s / m + v_y;
+    A[(V_Y, V_Y)] = -(k_f * c + k_r) / m;
+    A[(V_Y, YAW_RATE)] = -(k_f * l_f * c - k_r * l_r) / m - v_x;
+    A[(YAW_RATE, V_Y)] = -(k_f * l_f * c - k_r * l_r) / i_z;
+    A[(YAW_RATE, YAW_RATE)] = -(k_f * l_f * l_f * c + k_r * l_r * l_r) / i_z;
+    A[(E_Y, V_Y)] = c_psi;
+    A[(E_Y, E_PSI)] = v_x * sinc(e_psi, s_psi);
+    A[(E_PSI, V_X)] = -k_path * c_psi;
+    A[(E_PSI, V_Y)] = k_path * s_psi;
+    A[(E_PSI, YAW_RATE)] = 1.0;
+
+    let mut B = SMatrix::<f64, NX, NU>::zeros();
+    B[(V_X, DELTA)] = -c_f * ratio * s / m;
+    B[(V_X, A_X)] = 1.0;
+    B[(V_Y, DELTA)] = c_f * ratio * c / m;
+    B[(YAW_RATE, DELTA)] = c_f * ratio * l_f * c / i_z;
+
+    let d = State::from([
+        -f_f0 * s / m + disturbance[0],
+        (f_f0 * c + f_r0) / m + disturbance[1],
+        (l_f * f_f0 * c - l_r * f_r0) / i_z + disturbance[2],
+        0.0,
+        0.0,
+    ]);
+    Lpv { A, B, d }
+}
+
+/// Lateral velocity [m/s] in steady cornering at speed `v_x` [m/s] on curvature `kappa` [1/m], [Rajamani, section 3.3].
+pub fn steady_lateral_velocity(v_x: f64, kappa: f64, body: &Body, tyres: &Tyres) -> f64 {
+    let Body { m, l_f, l_r, .. } = *body;
+    kappa * v_x * (l_r - m * l_f * v_x * v_x / (tyres.c_r * (l_f + l_r)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    fn body() -> Body {
+        crate::Parameters::default().body()
+    }
+
+    #[test]
+    fn embedding_equals_the_nonlinear_right_hand_side() {
+        let mut rng = Pcg64Mcg::seed_from_u64(1);
+        let body = body();
+        let mut worst: f64 = 0.0;
+        for _ in 0..100_000 {
+            let mut draw = |low: f64, high: f64| rng.random_range(low..high);
+            let x = State::from([draw(0.0, 40.0), draw(-5.0, 5.0), draw(-2.0, 2.0), draw(-3.0, 3.0), draw(-1.5, 1.5)]);
+            let u = Input::from([draw(-0.6, 0.6), draw(-9.0, 5.0)]);
+            let kappa = draw(-0.1, 0.1);
+            let tyres =
+                Tyres { c_f: draw(1e3, 2e5), c_r: draw(1e3, 2e5), f_f0: draw(-5e3, 5e3), f_r0: draw(-5e3, 5e3) };
+            let disturbance = Disturbance::from([draw(-2.0, 2.0), draw(-2.0, 2.0), draw(-1.0, 1.0)]);
+            let Lpv { A, B, d } = embed(&x, &u, kappa, &body, &tyres, &disturbance);
+            let exact = derivative(&x, &u, kappa, &body, &tyres, &disturbance);
+            let residual = A * x + B * u + d - exact;
+            for row in 0..NX {
+                // Relative to the largest product in the row: the sum itself may cancel to nothing.
+                let scale = (0..NX)
+                    .map(|j| (A[(row, j)] * x[j]).abs())
+                    .chain((0..NU).map(|j| (B[(row, j)] * u[j]).abs()))
+                    .fold(1.0, f64::max);
+                worst = worst.max(residual[row].abs() / scale);
+            }
+        }
+        assert!(worst < 1e-12, "worst residual {worst:e}");
+    }
+
+    #[test]
+    fn lateral_error_row_makes_the_pair_controllable_and_the_printed_one_does_not() {
+        // Straight driving on the path, where every lane change begins.
+        let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
+        let u = Input::zeros();
+        let tyres = Tyres::secant(1.0e5, 7.6e4);
+        let Lpv { A, B, .. } = embed(&x, &u, 0.0, &body(), &tyres, &Disturbance::zeros());
+        let rank = |A: &SMatrix<f64, NX, NX>| {
+            let mut blocks = SMatrix::<f64, NX, { NX * NU }>::zeros();
+            let mut power = B;
+            for k in 0..NX {
+                // Scaled by the size of each block: powers of A span many decades.
+                blocks.fixed_columns_mut::<NU>(k * NU).copy_from(&(power / power.norm()));
+                power = A * power;
+            }
+            blocks.svd(false, false).singular_values.iter().filter(|s| **s > 1e-9).count()
+        };
+        assert_eq!(rank(&A), 5);
+        let mut printed = A;
+        printed[(E_Y, V_X)] = x[E_PSI].sin();
+        printed[(E_Y, E_PSI)] = 0.0;
+        assert_eq!(rank(&printed), 4);
+    }
+
+    #[test]
+    fn steady_cornering_is_an_equilibrium_for_small_angles() {
+        let body = body();
+        let tyres = Tyres::secant(1.0e5, 7.6e4);
+        let (v_x, kappa) = (15.0, 1e-5);
+        let Body { m, l_f, l_r, .. } = body;
+        let v_y = steady_lateral_velocity(v_x, kappa, &body, &tyres);
+        // Understeer gradient form of the steering angle, [Rajamani, eq. (3.13)].
+        let gradient = m * (l_r / tyres.c_f - l_f / tyres.c_r) / (l_f + l_r);
+        let delta = kappa * (l_f + l_r + gradient * v_x * v_x);
+        let x = State::from([v_x, v_y, kappa * v_x, 0.0, -v_y / v_x]);
+        let rate = derivative(&x, &Input::from([delta, 0.0]), kappa, &body, &tyres, &Disturbance::zeros());
+        // Second-order terms in angles of 1e-4 rad.
+        for row in [V_Y, YAW_RATE, E_Y, E_PSI] {
+            assert!(rate[row].abs() < 1e-9, "row {row}: {:e}", rate[row]);
+        }
+    }
+
+    #[test]
+    fn steering_at_rest_moves_nothing() {
+        let rate = derivative(
+            &State::zeros(),
+            &Input::from([0.4, 0.0]),
+            0.01,
+            &body(),
+            &Tyres::secant(1.0e5, 7.6e4),
+            &Disturbance::zeros(),
+        );
+        assert_eq!(rate, State::zeros());
+    }
+}

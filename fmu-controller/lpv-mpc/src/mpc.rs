@@ -1,0 +1,245 @@
+//! The predictive controller of one sample: schedule, model, quadratic programme, plan.
+//!
+//! The scheduling trajectory is the previous plan moved on by one sample; each stage is linearised in the middle between its
+//! two nodes, which makes the frozen system a second-order approximation of the varying one at no cost. `N_X` is 5 for ideal
+//! actuators and 7 when the actual steering angle and acceleration are states behind first-order lags; the inputs are the
+//! commands in both cases.
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::Parameters;
+use crate::discretise::{Discrete, Hold, discretise};
+use crate::latency::Predicted;
+use crate::model::{
+    A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed,
+    steady_lateral_velocity,
+};
+use crate::parameters::{Backend, HORIZON_MAX};
+use crate::qp::{Clarabel, Outcome, Problem, Solution, Stage, Structured};
+
+/// Number of states with the actuators' lags.
+pub const NX_LAGS: usize = NX + NU;
+
+/// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
+/// change: the third changes the first command by less than 1e-3 of its bound.
+const FIRST_PASSES: usize = 3;
+
+/// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
+const CLARABEL_TOLERANCE: f64 = 1e-10;
+
+/// What the plan shall follow, at the moments at which its states are predicted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// Curvature of the path [1/m].
+    pub kappa: SVector<f64, { HORIZON_MAX + 1 }>,
+    /// Wanted speed [m/s].
+    pub v_x: SVector<f64, { HORIZON_MAX + 1 }>,
+}
+
+/// A plan that may be executed: predicted states and commands, and how many samples ago it was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan<const N_X: usize> {
+    /// States, from the moment the first command acts to the end of the horizon.
+    pub x: Vec<SVector<f64, N_X>>, // N + 1
+    /// Commands.
+    pub u: Vec<Input>, // N
+    /// Samples since the plan was optimal; beyond the horizon nothing of it is left.
+    pub age: usize,
+}
+
+impl<const N_X: usize> Plan<N_X> {
+    fn none(horizon: usize) -> Self {
+        Self { x: vec![SVector::zeros(); horizon + 1], u: vec![Input::zeros(); horizon], age: horizon }
+    }
+
+    /// Whether something of the plan is left to execute.
+    pub fn is_left(&self) -> bool {
+        self.age < self.u.len()
+    }
+
+    /// Moves on by one sample; the end is repeated.
+    pub fn shift(&mut self) {
+        self.x.rotate_left(1);
+        self.u.rotate_left(1);
+        if let [.., before, last] = &mut self.x[..] {
+            *last = *before;
+        }
+        if let [.., before, last] = &mut self.u[..] {
+            *last = *before;
+        }
+        self.age += 1;
+    }
+}
+
+/// Model predictive controller over states of dimension `N_X`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Mpc<const N_X: usize> {
+    problem: Problem<N_X, NU>,
+    solution: Solution<N_X, NU>,
+    structured: Structured<N_X, NU>,
+    /// Holds nothing that could change an answer, so it is no part of a saved state.
+    #[serde(skip, default = "clarabel")]
+    clarabel: Clarabel<N_X, NU>,
+    backend: Backend,
+    /// The plan that is executed.
+    pub plan: Plan<N_X>,
+}
+
+impl<const N_X: usize> Mpc<N_X> {
+    /// Room for the horizon of valid parameters.
+    pub fn new(p: &Parameters) -> Self {
+        const { assert!(N_X == NX || N_X == NX_LAGS, "5 states, or 7 with the actuators") }
+        let mut mpc = Self {
+            problem: Problem::new(p.horizon),
+            solution: Solution::new(p.horizon),
+            structured: Structured::new(p.horizon),
+            clarabel: clarabel(),
+            backend: p.backend,
+            plan: Plan::none(p.horizon),
+        };
+        mpc.tune(p);
+        mpc
+    }
+
+    /// Takes over weights and bounds, which may change between samples.
+    pub fn tune(&mut self, p: &Parameters) {
+        let problem = &mut self.problem;
+        problem.q = SVector::zeros();
+        problem.q[V_X] = p.q_v_x;
+        problem.q[V_Y] = p.q_v_y;
+        problem.q[YAW_RATE] = p.q_yaw_rate;
+        problem.q[E_Y] = p.q_e_y;
+        problem.q[E_PSI] = p.q_e_psi;
+        problem.q_terminal = SMatrix::from_diagonal(&(problem.q * p.terminal_factor));
+        problem.r = Input::from([p.r_delta, p.r_a_x]);
+        problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
+        problem.u_max = Input::from([p.delta_max, p.a_x_max]);
+        problem.du_max = Input::from([p.delta_rate_max, p.a_x_rate_max]) * p.t_s;
+        problem.soft_state = E_Y;
+        problem.soft_bound = p.e_y_max;
+        problem.soft = p.e_y_penalty;
+    }
+
+    /// Plans from the predicted state. Returns what the answer is worth; the plan is in place when there is one.
+    #[expect(clippy::too_many_arguments, reason = "the measured situation and the beliefs, each of its own kind")]
+    pub fn step(
+        &mut self,
+        at: &Predicted,
+        u_prev: &Input,
+        reference: &Reference,
+        hold: &Hold,
+        body: &Body,
+        tyres: &Tyres,
+        disturbance: &Disturbance,
+    ) -> Outcome {
+        let continues = self.plan.is_left();
+        if continues {
+            self.plan.shift();
+            self.structured.shift();
+        } else {
+            self.structured.reset();
+            self.expect_steady_driving(reference, body, tyres);
+        }
+        self.problem.x_0 = full_state(at);
+        self.problem.u_prev = *u_prev;
+        let passes = if continues { 1 } else { FIRST_PASSES };
+        for _ in 0..passes {
+            self.plan.x[0] = self.problem.x_0;
+            self.model(reference, hold, body, tyres, disturbance);
+            if !self.solve() {
+                break;
+            }
+            self.plan.x.copy_from_slice(&self.solution.x);
+            self.plan.u.copy_from_slice(&self.solution.u);
+            self.plan.age = 0;
+        }
+        self.solution.outcome
+    }
+
+    /// Iterations of the solver, its scaled optimality residual, and the largest excess over the soft bound [m].
+    pub fn diagnostics(&self) -> (u32, f64, f64) {
+        (self.solution.iterations, self.solution.residual, self.solution.slack)
+    }
+
+    /// A schedule for the first sample: steady cornering on the reference.
+    fn expect_steady_driving(&mut self, reference: &Reference, body: &Body, tyres: &Tyres) {
+        for (i, x) in self.plan.x.iter_mut().enumerate() {
+            *x = steady_state(reference.v_x[i], reference.kappa[i], body, tyres);
+        }
+        for (i, u) in self.plan.u.iter_mut().enumerate() {
+            *u = Input::from([(body.l_f + body.l_r) * reference.kappa[i], 0.0]);
+        }
+    }
+
+    /// Fills the stages of the quadratic programme along the schedule.
+    fn model(&mut self, reference: &Reference, hold: &Hold, body: &Body, tyres: &Tyres, disturbance: &Disturbance) {
+        for (i, stage) in self.problem.stages.iter_mut().enumerate() {
+            let middle = (self.plan.x[i] + self.plan.x[i + 1]) * 0.5;
+            let u = if N_X == NX { self.plan.u[i] } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
+            let kappa = 0.5 * (reference.kappa[i] + reference.kappa[i + 1]);
+            let lpv = embed(&middle.fixed_rows::<NX>(0).into_owned(), &u, kappa, body, tyres, disturbance);
+            fill(stage, &discretise(&lpv, hold), hold);
+            stage.x_ref = steady_state(reference.v_x[i + 1], reference.kappa[i + 1], body, tyres);
+        }
+    }
+
+    /// Down the ladder of solvers; `true` when there is an optimal plan.
+    fn solve(&mut self) -> bool {
+        if self.backend == Backend::Structured {
+            self.structured.solve(&self.problem, &mut self.solution);
+            if self.solution.outcome.is_solved() || self.solution.outcome == Outcome::Invalid {
+                return self.solution.outcome.is_solved();
+            }
+        }
+        self.clarabel.solve(&self.problem, &mut self.solution);
+        self.solution.outcome.is_solved()
+    }
+}
+
+fn clarabel<const N_X: usize>() -> Clarabel<N_X, NU> {
+    Clarabel::new(CLARABEL_TOLERANCE)
+}
+
+/// State of the quadratic programme from the vehicle's and the actuators'.
+fn full_state<const N_X: usize>(at: &Predicted) -> SVector<f64, N_X> {
+    SVector::from_fn(|i, _| if i < NX { at.x[i] } else { at.actual[i - NX] })
+}
+
+/// Reference of the states: steady cornering at the wanted speed without lateral error.
+///
+/// [Kebbati] tracks the speed alone and pulls the other states to zero. In a turn the yaw rate, the lateral velocity and the
+/// sideslip that it takes are not zero; with weights larger than the paper's that pull would drag the car off the path.
+fn steady_state<const N_X: usize>(v_x: f64, kappa: f64, body: &Body, tyres: &Tyres) -> SVector<f64, N_X> {
+    let v_y = steady_lateral_velocity(v_x, kappa, body, tyres);
+    let mut x = SVector::zeros();
+    x[V_X] = v_x;
+    x[V_Y] = v_y;
+    x[YAW_RATE] = kappa * v_x;
+    x[E_PSI] = -v_y / v_x.max(crate::model::V_GUARD);
+    x
+}
+
+/// Writes one discrete sample into a stage, behind lags when the stage has them.
+fn fill<const N_X: usize>(stage: &mut Stage<N_X, NU>, sample: &Discrete, hold: &Hold) {
+    let Discrete { Phi, Gamma, Lag, d } = sample;
+    stage.A.fixed_view_mut::<NX, NX>(0, 0).copy_from(Phi);
+    stage.d.fixed_rows_mut::<NX>(0).copy_from(d);
+    if N_X == NX {
+        stage.B.fixed_rows_mut::<NX>(0).copy_from(Gamma);
+        return;
+    }
+    stage.B.fixed_rows_mut::<NX>(0).copy_from(&(Gamma - Lag));
+    for j in 0..NU {
+        for i in 0..NX {
+            stage.A[(i, NX + j)] = Lag[(i, j)];
+        }
+        stage.A[(NX + j, NX + j)] = hold.decay[j];
+        stage.B[(NX + j, j)] = 1.0 - hold.decay[j];
+    }
+}
+
+/// The vehicle's part of a planned state.
+pub fn vehicle_part<const N_X: usize>(x: &SVector<f64, N_X>) -> State {
+    x.fixed_rows::<NX>(0).into_owned()
+}

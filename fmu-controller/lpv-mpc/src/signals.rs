@@ -1,0 +1,142 @@
+//! What the controller is given and what it answers, named as in the public interface.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use crate::ladder::Status;
+use crate::model::{E_PSI, E_Y, State, Tyres, V_X, V_Y, YAW_RATE};
+use crate::mpc::Reference;
+use crate::parameters::HORIZON_MAX;
+use crate::preview::{self, Preview};
+
+/// A predicted quantity over the horizon; beyond it the last value is repeated.
+pub type Trajectory = SVector<f64, HORIZON_MAX>;
+
+/// What is measured, and what is wanted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Longitudinal velocity, body frame [m/s].
+    pub v_x: f64,
+    /// Lateral velocity, body frame [m/s].
+    pub v_y: f64,
+    /// Yaw rate, positive to the left [rad/s].
+    pub yaw_rate: f64,
+    /// Lateral position relative to the path, positive to the left [m].
+    pub e_y: f64,
+    /// Vehicle heading minus path heading [rad].
+    pub e_psi: f64,
+    /// Curvature of the path now and at the next 40 sample times [1/m].
+    pub kappa_ref: Preview,
+    /// Wanted speed now and at the next 40 sample times [m/s].
+    pub v_x_ref: Preview,
+    /// Whether only the first element of each preview is given and holds for the others.
+    pub hold_preview: bool,
+}
+
+impl Default for Inputs {
+    fn default() -> Self {
+        Self {
+            v_x: 0.0,
+            v_y: 0.0,
+            yaw_rate: 0.0,
+            e_y: 0.0,
+            e_psi: 0.0,
+            kappa_ref: Preview::zeros(),
+            v_x_ref: Preview::zeros(),
+            hold_preview: false,
+        }
+    }
+}
+
+impl Inputs {
+    /// The measured state.
+    pub(crate) fn state(&self) -> State {
+        let mut x = State::zeros();
+        x[V_X] = self.v_x;
+        x[V_Y] = self.v_y;
+        x[YAW_RATE] = self.yaw_rate;
+        x[E_Y] = self.e_y;
+        x[E_PSI] = self.e_psi;
+        x
+    }
+
+    /// Curvature `periods` after now [1/m].
+    pub(crate) fn curvature(&self, periods: f64) -> f64 {
+        self.read(&self.kappa_ref, periods)
+    }
+
+    fn speed(&self, periods: f64) -> f64 {
+        self.read(&self.v_x_ref, periods)
+    }
+
+    fn read(&self, preview: &Preview, periods: f64) -> f64 {
+        if self.hold_preview { preview[0] } else { preview::at(preview, periods) }
+    }
+
+    /// The reference from `latency` periods after now on.
+    pub(crate) fn reference(&self, latency: f64) -> Reference {
+        Reference {
+            kappa: Preview::from_fn(|i, _| self.curvature(latency + i as f64)),
+            v_x: Preview::from_fn(|i, _| self.speed(latency + i as f64)),
+        }
+    }
+}
+
+/// Command, diagnostics and plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    /// Front steering angle command [rad].
+    pub delta: f64,
+    /// Longitudinal acceleration command [m/s2].
+    pub a_x: f64,
+    /// Front cornering stiffness that the controller believes in [N/rad].
+    pub c_f: f64,
+    /// Rear cornering stiffness that the controller believes in [N/rad].
+    pub c_r: f64,
+    /// How good the command is.
+    pub status: Status,
+    /// Iterations of the solver.
+    pub iterations: u32,
+    /// Scaled residual of the conditions of optimality [1].
+    pub kkt_residual: f64,
+    /// Largest predicted excess over the soft bound on the lateral error [m].
+    pub slack_e_y: f64,
+    /// Predicted lateral error [m].
+    pub e_y_pred: Trajectory,
+    /// Predicted heading error [rad].
+    pub e_psi_pred: Trajectory,
+    /// Predicted longitudinal velocity [m/s].
+    pub v_x_pred: Trajectory,
+    /// Predicted lateral velocity [m/s].
+    pub v_y_pred: Trajectory,
+    /// Predicted yaw rate [rad/s].
+    pub yaw_rate_pred: Trajectory,
+    /// Planned steering angle commands [rad].
+    pub delta_pred: Trajectory,
+    /// Planned acceleration commands [m/s2].
+    pub a_x_pred: Trajectory,
+}
+
+impl Output {
+    /// Before the first sample: no command, no plan, the nominal beliefs.
+    pub(crate) fn initial(tyres: &Tyres) -> Self {
+        let nothing = Trajectory::zeros();
+        Self {
+            delta: 0.0,
+            a_x: 0.0,
+            c_f: tyres.c_f,
+            c_r: tyres.c_r,
+            status: Status::Optimal,
+            iterations: 0,
+            kkt_residual: 0.0,
+            slack_e_y: 0.0,
+            e_y_pred: nothing,
+            e_psi_pred: nothing,
+            v_x_pred: nothing,
+            v_y_pred: nothing,
+            yaw_rate_pred: nothing,
+            delta_pred: nothing,
+            a_x_pred: nothing,
+        }
+    }
+}
