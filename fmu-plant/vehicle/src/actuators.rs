@@ -1,0 +1,197 @@
+//! Actuators between command and wheel: position limit, pure delay, first-order lag and rate limit.
+//!
+//! Commands are linear in time between changes, so the motion of an actuator is a chain of straight and exponential
+//! pieces. Each piece is solved in closed form and its end is known; the integrator never steps across one. That makes
+//! delay and rate limit exact for any communication step.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+/// Times closer than this are the same time: rounding of summed steps, far below any effect on the motion [s].
+const SAME_TIME: f64 = 1e-10;
+
+/// Changes of the command that a delay remembers: 1 s of them at a communication step of 0.25 ms. Denser changes push
+/// the oldest out, which then end early.
+const CAPACITY: usize = 4096;
+
+/// Constants of one actuator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuator {
+    /// Pure delay [s].
+    pub delay: f64,
+    /// Time constant of the lag, 0 for none [s].
+    pub tau: f64,
+    /// Largest rate, 0 for none [unit/s].
+    pub rate_max: f64,
+    /// Smallest position [unit].
+    pub min: f64,
+    /// Largest position [unit].
+    pub max: f64,
+}
+
+/// A command that is linear in time.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Ramp {
+    /// Value at the start [unit].
+    pub value: f64,
+    /// Rate of change [unit/s].
+    pub slope: f64,
+}
+
+/// How the position moves until the end of a piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// At a constant rate.
+    Straight(Ramp),
+    /// Along `ramp` plus a decaying exponential of this amplitude, with the time constant `tau`.
+    Decay {
+        /// What remains when the exponential has died away.
+        ramp: Ramp,
+        /// Amplitude of the exponential at the start [unit].
+        amplitude: f64,
+        /// Time constant [s].
+        tau: f64,
+    },
+}
+
+impl Piece {
+    /// Position at `t` seconds after the start of the piece.
+    #[must_use]
+    pub fn at(&self, t: f64) -> f64 {
+        match *self {
+            Self::Straight(Ramp { value, slope }) => value + slope * t,
+            Self::Decay { ramp, amplitude, tau } => ramp.value + ramp.slope * t + amplitude * (-t / tau).exp(),
+        }
+    }
+
+    /// Whether the position stands still over the piece.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        matches!(self, Self::Straight(Ramp { slope, .. }) if *slope == 0.0)
+    }
+}
+
+/// Position and memory of one actuator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Position reached [unit].
+    pub position: f64,
+    /// Commands not yet replaced at the far end of the delay, with their times, oldest first.
+    history: VecDeque<(f64, Ramp)>,
+}
+
+impl State {
+    /// At rest in position 0.
+    #[must_use]
+    pub fn new(actuator: &Actuator) -> Self {
+        let capacity = if actuator.delay > 0.0 { CAPACITY } else { 0 };
+        Self { position: 0.0, history: VecDeque::with_capacity(capacity) }
+    }
+
+    /// Takes the command that holds from `time` on.
+    pub fn command(&mut self, actuator: &Actuator, time: f64, command: Ramp) {
+        if actuator.delay == 0.0 {
+            return;
+        }
+        // What every part of the delay line has already forgotten: an entry whose successor has come through.
+        while self.history.len() > 1 && self.history[1].0 + actuator.delay <= time + SAME_TIME {
+            self.history.pop_front();
+        }
+        if let Some((_, last)) = self.history.back()
+            && last.slope == 0.0
+            && *last == command
+        {
+            return;
+        }
+        if self.history.len() == CAPACITY {
+            self.history.pop_front();
+        }
+        self.history.push_back((time, command));
+    }
+
+    /// The command at the end of the delay at `time`, and how long it stays linear [s].
+    fn delayed(&self, actuator: &Actuator, time: f64, now: Ramp) -> (Ramp, f64) {
+        if actuator.delay == 0.0 {
+            return (now, f64::INFINITY);
+        }
+        let sent = time - actuator.delay;
+        let mut current = Ramp::default();
+        for &(start, ramp) in &self.history {
+            if start > sent + SAME_TIME {
+                return (current, start - sent);
+            }
+            current = Ramp { value: ramp.value + ramp.slope * (sent - start), slope: ramp.slope };
+        }
+        (current, f64::INFINITY)
+    }
+
+    /// The next piece from `time` on, at most `limit` seconds long, and its length [s].
+    ///
+    /// `now` is the command at `time` before the delay; the caller moves `position` to the end of what it uses.
+    #[must_use]
+    pub fn piece(&self, actuator: &Actuator, time: f64, now: Ramp, limit: f64) -> (Piece, f64) {
+        let (command, until) = self.delayed(actuator, time, now);
+        let (command, inside) = clamped(command, actuator.min, actuator.max);
+        let limit = limit.min(until).min(inside);
+        let (piece, length) = follow(actuator, self.position, command);
+        (piece, limit.min(length))
+    }
+}
+
+/// The command inside its limits, and how long that stays one straight piece [s].
+fn clamped(command: Ramp, min: f64, max: f64) -> (Ramp, f64) {
+    let Ramp { value, slope } = command;
+    // A value at its limit that moves outward is already clamped; moving inward it is free.
+    if value > max || (value == max && slope > 0.0) {
+        let length = if slope < 0.0 { (max - value) / slope } else { f64::INFINITY };
+        (Ramp { value: max, slope: 0.0 }, length.max(SAME_TIME))
+    } else if value < min || (value == min && slope < 0.0) {
+        let length = if slope > 0.0 { (min - value) / slope } else { f64::INFINITY };
+        (Ramp { value: min, slope: 0.0 }, length.max(SAME_TIME))
+    } else if slope == 0.0 {
+        (command, f64::INFINITY)
+    } else {
+        let edge = if slope > 0.0 { max } else { min };
+        (command, ((edge - value) / slope).max(SAME_TIME))
+    }
+}
+
+/// Motion from `position` towards `command`, and how long its form holds [s].
+fn follow(actuator: &Actuator, position: f64, command: Ramp) -> (Piece, f64) {
+    let Actuator { tau, rate_max, .. } = *actuator;
+    let error = command.value - position;
+    if tau == 0.0 {
+        if rate_max == 0.0 {
+            return (Piece::Straight(command), f64::INFINITY);
+        }
+        // Following needs no more than the rate limit: once there, the command is tracked exactly.
+        if error.abs() <= SAME_TIME * rate_max && command.slope.abs() <= rate_max {
+            return (Piece::Straight(command), f64::INFINITY);
+        }
+        let rate = rate_max.copysign(if error.abs() > SAME_TIME * rate_max { error } else { command.slope });
+        return (straight(position, rate), meeting(error, rate, command.slope));
+    }
+    // The lag wants the rate (u - p) / tau; a rate limit holds it until the wish is back inside.
+    let wish = error / tau;
+    if rate_max > 0.0 && wish.abs() > rate_max * (1.0 + 1e-12) {
+        let rate = rate_max.copysign(error);
+        return (straight(position, rate), meeting(error - rate * tau, rate, command.slope));
+    }
+    let slope = if rate_max > 0.0 { command.slope.clamp(-rate_max, rate_max) } else { command.slope };
+    // p = u - slope tau + (p_0 - u_0 + slope tau) exp(-t / tau). A command steeper than the rate limit makes the wish
+    // reach the limit; from inside, following at the limit's slope never does, and the difference is never reached by
+    // commands that respect the limit themselves.
+    let ramp = Ramp { value: command.value - slope * tau, slope };
+    (Piece::Decay { ramp, amplitude: position - ramp.value, tau }, f64::INFINITY)
+}
+
+fn straight(value: f64, slope: f64) -> Piece {
+    Piece::Straight(Ramp { value, slope })
+}
+
+/// When a gap that one side closes at `rate` and the other opens at `slope` is gone [s].
+fn meeting(gap: f64, rate: f64, slope: f64) -> f64 {
+    let time = gap / (rate - slope);
+    if time > 0.0 { time.max(SAME_TIME) } else { f64::INFINITY }
+}
