@@ -26,14 +26,10 @@ impl Files {
         if !folder.is_dir() {
             return Ok(());
         }
-        for entry in
-            fs::read_dir(folder).with_context(|| format!("reading {}", folder.display()))?
-        {
+        for entry in fs::read_dir(folder).with_context(|| format!("reading {}", folder.display()))? {
             let entry = entry?;
             let name = entry.file_name();
-            let name = name
-                .to_str()
-                .with_context(|| format!("{} is not valid UTF-8", entry.path().display()))?;
+            let name = name.to_str().with_context(|| format!("{} is not valid UTF-8", entry.path().display()))?;
             let path = format!("{prefix}/{name}");
             if entry.file_type()?.is_dir() {
                 self.add_folder(&path, &entry.path())?;
@@ -51,16 +47,13 @@ impl Files {
 
     /// All files in the order of the archive.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &[u8])> {
-        self.0
-            .iter()
-            .map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
+        self.0.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
     }
 
     /// Reads an archive.
     pub fn open(archive: &Path) -> Result<Self> {
         let file = File::open(archive).with_context(|| format!("opening {}", archive.display()))?;
-        let mut zip = ZipArchive::new(file)
-            .with_context(|| format!("{} is not a zip archive", archive.display()))?;
+        let mut zip = ZipArchive::new(file).with_context(|| format!("{} is not a zip archive", archive.display()))?;
         let mut files = Self::default();
         for index in 0..zip.len() {
             let mut entry = zip.by_index(index)?;
@@ -97,11 +90,7 @@ impl Files {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
         for (path, bytes) in self.iter() {
             // A library needs its execute bit on systems that keep one; Windows ignores it.
-            let mode = if path.starts_with("binaries/") {
-                0o755
-            } else {
-                0o644
-            };
+            let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
             let options = SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Deflated)
                 .last_modified_time(DateTime::default())
@@ -123,12 +112,11 @@ impl Files {
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
     fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)
-        .with_context(|| format!("writing into {}", folder.display()))?;
+    let mut file =
+        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("writing into {}", folder.display()))?;
     file.write_all(bytes)?;
     make_readable(file.as_file())?;
-    file.persist(path)
-        .with_context(|| format!("writing {}", path.display()))?;
+    file.persist(path).with_context(|| format!("writing {}", path.display()))?;
     Ok(())
 }
 
@@ -162,18 +150,14 @@ mod tests {
     fn sample() -> Files {
         let mut files = Files::default();
         files.add("resources/b.txt", "b").unwrap();
-        files
-            .add("binaries/linux64/a.so", vec![0_u8; 5000])
-            .unwrap();
+        files.add("binaries/linux64/a.so", vec![0_u8; 5000]).unwrap();
         files
     }
 
     #[test]
     fn the_bytes_do_not_depend_on_the_order_of_adding() {
         let mut other = Files::default();
-        other
-            .add("binaries/linux64/a.so", vec![0_u8; 5000])
-            .unwrap();
+        other.add("binaries/linux64/a.so", vec![0_u8; 5000]).unwrap();
         other.add("resources/b.txt", "b").unwrap();
         assert_eq!(sample().to_bytes().unwrap(), other.to_bytes().unwrap());
     }
@@ -197,8 +181,7 @@ mod tests {
     #[test]
     fn a_name_that_leaves_the_folder_is_refused() {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-        zip.start_file("../evil", SimpleFileOptions::default())
-            .unwrap();
+        zip.start_file("../evil", SimpleFileOptions::default()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.fmu");
         fs::write(&path, zip.finish().unwrap().into_inner()).unwrap();

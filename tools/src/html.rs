@@ -36,10 +36,7 @@ pub fn document(title: &str, head: &str, body: &str) -> String {
 
 /// Text as markup that shows this text.
 pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A table; the columns marked as numbers are set to the right. Cells are markup.
@@ -70,21 +67,12 @@ mod tests {
 
     #[test]
     fn text_cannot_become_markup() {
-        assert_eq!(
-            escape("<a href=\"x\"> & co"),
-            "&lt;a href=&quot;x&quot;&gt; &amp; co"
-        );
+        assert_eq!(escape("<a href=\"x\"> & co"), "&lt;a href=&quot;x&quot;&gt; &amp; co");
     }
 
     #[test]
     fn only_number_columns_are_set_to_the_right() {
-        let markup = table(
-            &[("name", false), ("value", true)],
-            &[vec!["m".into(), "1575".into()]],
-        );
-        assert!(
-            markup.contains("<td>m</td><td class=\"number\">1575</td>"),
-            "{markup}"
-        );
+        let markup = table(&[("name", false), ("value", true)], &[vec!["m".into(), "1575".into()]]);
+        assert!(markup.contains("<td>m</td><td class=\"number\">1575</td>"), "{markup}");
     }
 }

@@ -54,9 +54,7 @@ unsafe extern "C" fn log(
             return String::new();
         }
         // SAFETY: [FMI, 2.1.5] category and message are zero-terminated and live during the call.
-        unsafe { CStr::from_ptr(pointer) }
-            .to_string_lossy()
-            .into_owned()
+        unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
     };
     // The message is a format string without arguments, in which a per cent sign is doubled.
     let line = format!("{}: {}", text(category), text(message).replace("%%", "%"));
@@ -141,17 +139,13 @@ impl Fmu {
         ));
         let resources = folder.path().join("resources");
         let fmu = Self::load(&library, &resources, interface)?;
-        Ok(Self {
-            _folder: Some(folder),
-            ..fmu
-        })
+        Ok(Self { _folder: Some(folder), ..fmu })
     }
 
     /// Loads a library that lies somewhere on the disk.
     pub fn load(library: &Path, resources: &Path, interface: Interface) -> Result<Self> {
         // SAFETY: [FMI, 2.3] loading an FMU's library runs none of its code but the runtime's own start.
-        let library = unsafe { Library::new(library) }
-            .with_context(|| format!("loading {}", library.display()))?;
+        let library = unsafe { Library::new(library) }.with_context(|| format!("loading {}", library.display()))?;
         Ok(Self {
             functions: Functions::load(&library)?,
             interface,
@@ -191,18 +185,9 @@ impl Fmu {
                 0,
             )
         };
-        let instance = Instance {
-            fmu: self,
-            component,
-            messages,
-            _callbacks: callbacks,
-        };
+        let instance = Instance { fmu: self, component, messages, _callbacks: callbacks };
         if component.is_null() {
-            bail!(
-                "{} cannot be instantiated: {}",
-                self.interface.model_name,
-                instance.log()
-            );
+            bail!("{} cannot be instantiated: {}", self.interface.model_name, instance.log());
         }
         Ok(instance)
     }
@@ -211,11 +196,7 @@ impl Fmu {
 /// A path as the URI that [FMI, 2.1.5] asks for; bytes that a URI cannot hold are percent-encoded.
 fn file_uri(path: &Path) -> String {
     let path = path.to_string_lossy().replace('\\', "/");
-    let mut uri = String::from(if path.starts_with('/') {
-        "file://"
-    } else {
-        "file:///"
-    });
+    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "file:///" });
     for byte in path.bytes() {
         if byte.is_ascii_alphanumeric() || b"/:._-~".contains(&byte) {
             uri.push(char::from(byte));
@@ -251,20 +232,11 @@ impl Instance<'_> {
 
     /// Everything logged so far, in one line.
     pub fn log(&self) -> String {
-        self.messages
-            .lock()
-            .map(|messages| messages.join("; "))
-            .unwrap_or_default()
+        self.messages.lock().map(|messages| messages.join("; ")).unwrap_or_default()
     }
 
     fn check(&self, call: &str, status: Status) -> Result<()> {
-        ensure!(
-            status <= WARNING,
-            "{} of {} failed: {}",
-            call,
-            self.fmu.interface.model_name,
-            self.log()
-        );
+        ensure!(status <= WARNING, "{} of {} failed: {}", call, self.fmu.interface.model_name, self.log());
         Ok(())
     }
 
@@ -301,14 +273,8 @@ impl Instance<'_> {
         assert_eq!(references.len(), values.len(), "a value for each reference");
         let count = references.len();
         // SAFETY: [FMI, 2.1.7] both arrays have `count` elements.
-        let status = unsafe {
-            (self.fmu.functions.get_real)(
-                self.component,
-                references.as_ptr(),
-                count,
-                values.as_mut_ptr(),
-            )
-        };
+        let status =
+            unsafe { (self.fmu.functions.get_real)(self.component, references.as_ptr(), count, values.as_mut_ptr()) };
         self.check("getReal", status)
     }
 
@@ -317,14 +283,8 @@ impl Instance<'_> {
         assert_eq!(references.len(), values.len(), "a value for each reference");
         let count = references.len();
         // SAFETY: [FMI, 2.1.7] both arrays have `count` elements.
-        let status = unsafe {
-            (self.fmu.functions.set_real)(
-                self.component,
-                references.as_ptr(),
-                count,
-                values.as_ptr(),
-            )
-        };
+        let status =
+            unsafe { (self.fmu.functions.set_real)(self.component, references.as_ptr(), count, values.as_ptr()) };
         self.check("setReal", status)
     }
 
@@ -342,14 +302,7 @@ impl Instance<'_> {
         };
         let mut value = 0;
         // SAFETY: [FMI, 2.1.7] one reference, one value; integers and Booleans have the same C type.
-        let status = unsafe {
-            get(
-                self.component,
-                &raw const variable.reference,
-                1,
-                &raw mut value,
-            )
-        };
+        let status = unsafe { get(self.component, &raw const variable.reference, 1, &raw mut value) };
         self.check(&format!("getting {}", variable.name), status)?;
         Ok(f64::from(value))
     }
@@ -393,10 +346,7 @@ mod tests {
 
     #[test]
     fn a_path_with_blanks_becomes_a_valid_uri() {
-        assert_eq!(
-            file_uri(Path::new("/tmp/a b/\u{e4}")),
-            "file:///tmp/a%20b/%C3%A4"
-        );
+        assert_eq!(file_uri(Path::new("/tmp/a b/\u{e4}")), "file:///tmp/a%20b/%C3%A4");
         assert_eq!(file_uri(Path::new("C:\\x")), "file:///C:/x");
     }
 }

@@ -32,15 +32,9 @@ impl Kind {
     }
 
     fn parse(name: &str) -> Option<Self> {
-        [
-            Self::Real,
-            Self::Integer,
-            Self::Boolean,
-            Self::String,
-            Self::Enumeration,
-        ]
-        .into_iter()
-        .find(|kind| kind.name() == name)
+        [Self::Real, Self::Integer, Self::Boolean, Self::String, Self::Enumeration]
+            .into_iter()
+            .find(|kind| kind.name() == name)
     }
 }
 
@@ -114,17 +108,12 @@ impl Interface {
         if root.name != "fmiModelDescription" || root.get("fmiVersion") != Some("2.0") {
             bail!("not a model description of FMI 2.0: {}", root.name);
         }
-        let slave = root
-            .find("CoSimulation")
-            .context("the model description offers no co-simulation")?;
+        let slave = root.find("CoSimulation").context("the model description offers no co-simulation")?;
         let types = root.list("TypeDefinitions");
         let number = |name: &str| -> Result<Option<f64>> {
             root.find("DefaultExperiment")
                 .and_then(|experiment| experiment.get(name))
-                .map(|text| {
-                    text.parse()
-                        .with_context(|| format!("{name} is not a number: {text}"))
-                })
+                .map(|text| text.parse().with_context(|| format!("{name} is not a number: {text}")))
                 .transpose()
         };
         Ok(Self {
@@ -139,10 +128,7 @@ impl Interface {
                 .map(|element| variable(element, types))
                 .collect::<Result<_>>()?,
             units: root.list("UnitDefinitions").to_vec(),
-            enumerations: types
-                .iter()
-                .filter_map(enumeration)
-                .collect::<Result<_>>()?,
+            enumerations: types.iter().filter_map(enumeration).collect::<Result<_>>()?,
             stop_time: number("stopTime")?,
             step_size: number("stepSize")?,
         })
@@ -158,9 +144,7 @@ impl Interface {
 
     /// Variables of one causality.
     pub fn with_causality(&self, causality: &str) -> impl Iterator<Item = &Variable> {
-        self.variables
-            .iter()
-            .filter(move |variable| variable.causality == causality)
+        self.variables.iter().filter(move |variable| variable.causality == causality)
     }
 }
 
@@ -173,26 +157,15 @@ fn variable(element: &Element, types: &[Element]) -> Result<Variable> {
         .with_context(|| format!("variable {name} has no type"))?;
     let declared = typed
         .get("declaredType")
-        .and_then(|declared| {
-            types
-                .iter()
-                .find(|entry| entry.get("name") == Some(declared))
-        })
+        .and_then(|declared| types.iter().find(|entry| entry.get("name") == Some(declared)))
         .and_then(|entry| entry.find(kind.name()));
-    let attribute = |key: &str| {
-        typed
-            .get(key)
-            .or_else(|| declared.and_then(|declared| declared.get(key)))
-            .map(str::to_owned)
-    };
+    let attribute =
+        |key: &str| typed.get(key).or_else(|| declared.and_then(|declared| declared.get(key))).map(str::to_owned);
     Ok(Variable {
         reference: element.require("valueReference")?.parse()?,
         kind,
         causality: element.get("causality").unwrap_or("local").to_owned(),
-        variability: element
-            .get("variability")
-            .unwrap_or("continuous")
-            .to_owned(),
+        variability: element.get("variability").unwrap_or("continuous").to_owned(),
         description: element.get("description").unwrap_or_default().to_owned(),
         unit: attribute("unit"),
         start: typed.get("start").map(str::to_owned),
@@ -239,25 +212,16 @@ mod tests {
     fn a_variable_inherits_unit_and_range_from_its_declared_type() {
         let interface = Interface::parse(DOCUMENT).unwrap();
         let x = interface.variable("x[1]").unwrap();
-        assert_eq!(
-            (x.reference, x.kind, x.unit.as_deref()),
-            (7, Kind::Real, Some("m"))
-        );
+        assert_eq!((x.reference, x.kind, x.unit.as_deref()), (7, Kind::Real, Some("m")));
         assert_eq!((x.min.as_deref(), x.max.as_deref()), (Some("0"), None));
         assert_eq!(interface.enumerations[0].1[1].name, "bad");
-        assert_eq!(
-            (interface.stop_time, interface.step_size),
-            (Some(8.5), None)
-        );
+        assert_eq!((interface.stop_time, interface.step_size), (Some(8.5), None));
         assert_eq!(interface.with_causality("output").count(), 1);
     }
 
     #[test]
     fn a_missing_variable_is_named() {
-        let error = Interface::parse(DOCUMENT)
-            .unwrap()
-            .variable("y")
-            .unwrap_err();
+        let error = Interface::parse(DOCUMENT).unwrap().variable("y").unwrap_err();
         assert_eq!(error.to_string(), "M has no variable y");
     }
 }

@@ -1,10 +1,55 @@
 //! The tools around the two FMUs: pack them, drive them, show what they do. Run as `cargo fmu COMMAND`.
 
 pub mod archive;
+pub mod demo;
 pub mod html;
 pub mod importer;
 pub mod interface;
 pub mod output;
 pub mod pack;
+pub mod plots;
+pub mod recording;
+pub mod simulate;
 pub mod workspace;
 pub mod xml;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+use output::Output;
+
+/// An adaptive MPC for path tracking and the vehicle that it drives, as two FMUs.
+#[derive(Clone, Debug, Parser)]
+#[command(
+    name = "cargo fmu",
+    bin_name = "cargo fmu",
+    version,
+    after_help = "\
+Start with:
+  cargo fmu demo        see the controller drive the vehicle, find the archives and a page of plots
+  cargo fmu simulate    try other roads, speeds and parameters
+  cargo fmu COMMAND --help"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Pack(pack::Args),
+    Simulate(simulate::Args),
+}
+
+impl Cli {
+    /// Runs the command that was asked for.
+    pub fn run(&self) -> Result<()> {
+        let output = Output::default();
+        match &self.command {
+            Command::Demo(args) => demo::run(args, &output),
+            Command::Pack(args) => pack::run(args, &output),
+            Command::Simulate(args) => simulate::run(args, &output),
+        }
+    }
+}

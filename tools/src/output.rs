@@ -38,9 +38,7 @@ impl Output {
         let style = ProgressStyle::with_template("{msg} [{bar:40}] {percent:>3} %")
             .unwrap_or_else(|_| ProgressStyle::default_bar())
             .progress_chars("=> ");
-        ProgressBar::new(steps)
-            .with_style(style)
-            .with_message(message.to_owned())
+        ProgressBar::new(steps).with_style(style).with_message(message.to_owned())
     }
 }
 
@@ -48,11 +46,7 @@ impl Output {
 pub fn table(rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
-        rows.iter()
-            .filter_map(|row| row.get(column))
-            .map(|cell| cell.chars().count())
-            .max()
-            .unwrap_or(0)
+        rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns).map(width).collect();
     rows.iter()
@@ -77,10 +71,7 @@ mod tests {
 
     #[test]
     fn columns_of_a_table_line_up() {
-        let rows = [
-            vec!["a".into(), "1.5".into()],
-            vec!["long".into(), "22.25".into()],
-        ];
+        let rows = [vec!["a".into(), "1.5".into()], vec!["long".into(), "22.25".into()]];
         assert_eq!(table(&rows), ["a       1.5", "long  22.25"]);
     }
 }

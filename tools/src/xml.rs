@@ -20,10 +20,7 @@ pub struct Element {
 impl Element {
     /// An empty element.
     pub fn new(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            ..Self::default()
-        }
+        Self { name: name.to_owned(), ..Self::default() }
     }
 
     /// The element with one more attribute.
@@ -58,16 +55,12 @@ impl Element {
 
     /// Value of an attribute.
     pub fn get(&self, name: &str) -> Option<&str> {
-        self.attributes
-            .iter()
-            .find(|(key, _)| key == name)
-            .map(|(_, value)| value.as_str())
+        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
     /// Value of an attribute that the schema demands.
     pub fn require(&self, name: &str) -> Result<&str> {
-        self.get(name)
-            .with_context(|| format!("element {} has no attribute {name}", self.name))
+        self.get(name).with_context(|| format!("element {} has no attribute {name}", self.name))
     }
 
     /// First child of that name.
@@ -119,11 +112,7 @@ impl Element {
                 Ok((attribute.key.as_ref().to_owned(), value.into_owned()))
             })
             .collect::<Result<_>>()?;
-        Ok(Self {
-            name: start.name().as_ref().to_owned(),
-            attributes,
-            ..Self::default()
-        })
+        Ok(Self { name: start.name().as_ref().to_owned(), attributes, ..Self::default() })
     }
 
     /// Writes a document, indented by two blanks.

@@ -11,11 +11,7 @@ use crate::html::{document, escape, table};
 use crate::interface::{Interface, Variable};
 
 /// Sections of the variable list in the order in which a reader wants them.
-const SECTIONS: [(&str, &str); 3] = [
-    ("input", "Inputs"),
-    ("output", "Outputs"),
-    ("parameter", "Parameters"),
-];
+const SECTIONS: [(&str, &str); 3] = [("input", "Inputs"), ("output", "Outputs"), ("parameter", "Parameters")];
 
 /// Adds index.html and whatever else lies in the folder. Markdown files become chapters, in the order of their names.
 pub fn add(files: &mut Files, interface: &Interface, folder: &Path) -> Result<()> {
@@ -48,13 +44,8 @@ fn sorted(folder: &Path) -> Result<Vec<PathBuf>> {
 
 fn markup(markdown: &str) -> String {
     let mut markup = String::new();
-    push_html(
-        &mut markup,
-        Parser::new_ext(markdown, Options::ENABLE_TABLES),
-    );
-    markup
-        .replace("<table>", "<div class=\"wide\"><table>")
-        .replace("</table>", "</table></div>")
+    push_html(&mut markup, Parser::new_ext(markdown, Options::ENABLE_TABLES));
+    markup.replace("<table>", "<div class=\"wide\"><table>").replace("</table>", "</table></div>")
 }
 
 fn page(interface: &Interface, chapters: &[String]) -> String {
@@ -75,18 +66,9 @@ fn page(interface: &Interface, chapters: &[String]) -> String {
         body.push_str(&format!("<h3>Values of {}</h3>\n", escape(name)));
         let rows: Vec<Vec<String>> = items
             .iter()
-            .map(|item| {
-                vec![
-                    item.value.to_string(),
-                    escape(&item.name),
-                    escape(&item.description),
-                ]
-            })
+            .map(|item| vec![item.value.to_string(), escape(&item.name), escape(&item.description)])
             .collect();
-        body.push_str(&table(
-            &[("value", true), ("name", false), ("meaning", false)],
-            &rows,
-        ));
+        body.push_str(&table(&[("value", true), ("name", false), ("meaning", false)], &rows));
     }
     document(&interface.model_name, "", &body)
 }
@@ -135,11 +117,7 @@ fn folded<'a>(variables: impl Iterator<Item = &'a Variable>) -> Vec<(String, &'a
         let stem = variable.name.split('[').next().unwrap_or_default();
         match rows.last_mut() {
             Some((last, count, _)) if last == stem && variable.name.contains('[') => *count += 1,
-            _ => rows.push((
-                stem.to_owned(),
-                usize::from(variable.name.contains('[')),
-                variable,
-            )),
+            _ => rows.push((stem.to_owned(), usize::from(variable.name.contains('[')), variable)),
         }
     }
     rows.into_iter()
@@ -167,17 +145,8 @@ mod tests {
     #[test]
     fn the_page_lists_every_variable_and_folds_arrays() {
         let interface = Interface::parse(DOCUMENT).unwrap();
-        let page = page(
-            &interface,
-            &[markup("# Timing\n\n| a | b |\n|---|---|\n| 1 | 2 |\n")],
-        );
-        for part in [
-            "<h1>Timing</h1>",
-            "<code>a</code>",
-            "x &lt; 1",
-            "<code>b[1..2]</code>",
-            "<h3>Parameters</h3>",
-        ] {
+        let page = page(&interface, &[markup("# Timing\n\n| a | b |\n|---|---|\n| 1 | 2 |\n")]);
+        for part in ["<h1>Timing</h1>", "<code>a</code>", "x &lt; 1", "<code>b[1..2]</code>", "<h3>Parameters</h3>"] {
             assert!(page.contains(part), "{part} is missing in\n{page}");
         }
         assert!(!page.contains("<h3>Outputs</h3>"));

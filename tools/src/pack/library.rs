@@ -28,11 +28,7 @@ pub fn build(models: &[Model]) -> Result<Vec<PathBuf>> {
     // Under `cargo run`, the variable names the very cargo that started this program.
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.args([
-        "build",
-        "--release",
-        "--message-format=json-render-diagnostics",
-    ]);
+    command.args(["build", "--release", "--message-format=json-render-diagnostics"]);
     for model in models {
         command.args(["--package", model.package]);
     }
@@ -48,12 +44,8 @@ pub fn build(models: &[Model]) -> Result<Vec<PathBuf>> {
     models
         .iter()
         .map(|model| {
-            find(&messages, model.identifier).with_context(|| {
-                format!(
-                    "cargo built no library {} from {}",
-                    model.identifier, model.package
-                )
-            })
+            find(&messages, model.identifier)
+                .with_context(|| format!("cargo built no library {} from {}", model.identifier, model.package))
         })
         .collect()
 }
@@ -64,15 +56,11 @@ fn find(messages: &str, identifier: &str) -> Option<PathBuf> {
         .lines()
         .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
         .filter(|artifact| {
-            artifact.target.name == identifier
-                && artifact.target.kind.iter().any(|kind| kind == "cdylib")
+            artifact.target.name == identifier && artifact.target.kind.iter().any(|kind| kind == "cdylib")
         })
         .flat_map(|artifact| artifact.filenames)
         // Windows adds an import library and debug symbols, which no FMU needs.
-        .find(|file| {
-            file.extension().and_then(|extension| extension.to_str())
-                == Some(std::env::consts::DLL_EXTENSION)
-        })
+        .find(|file| file.extension().and_then(|extension| extension.to_str()) == Some(std::env::consts::DLL_EXTENSION))
 }
 
 /// Loads the library and asks it to instantiate with the fingerprint of the XML.

@@ -38,11 +38,7 @@ pub fn run(_args: &Args, output: &Output) -> Result<()> {
     let packed = pack(output)?;
     for path in [&packed.controller, &packed.plant, &packed.system] {
         let size = path.metadata()?.len();
-        output.line(&format!(
-            "{:<34} {:>7.1} kB",
-            workspace::shown(path),
-            size as f64 / 1e3
-        ));
+        output.line(&format!("{:<34} {:>7.1} kB", workspace::shown(path), size as f64 / 1e3));
     }
     Ok(())
 }

@@ -1,0 +1,134 @@
+//! `cargo fmu simulate`: the closed loop on the cores, at any step, on any road.
+
+pub mod native;
+pub mod settings;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use clap::Parser;
+use lpv_mpc::Controller;
+use vehicle::{Road, Vehicle};
+
+use crate::archive::{read_text, write_whole};
+
+use crate::output::{Output, table};
+use crate::plots::page;
+use crate::recording::{PAPER, Recording, Tracking, tracking_table};
+use crate::workspace::shown;
+use settings::Settings;
+
+/// Drives the closed loop natively and prints how well it follows.
+///
+/// Gives the same bits as the packed FMUs under a master that exchanges values once a step, without the detour through FMI.
+#[derive(Clone, Debug, Parser)]
+#[command(after_help = "\
+Examples:
+  cargo fmu simulate                                    the lane change at 14 m/s, 1 ms steps
+  cargo fmu simulate --road general --step 0.033        1 km of bends in a gusty wind, one whole sample of latency
+  cargo fmu simulate --set plant.speed=16 --set controller.horizon=20
+  cargo fmu simulate --set plant.noise_scale=1 --csv run.csv --page run.html
+  cargo fmu simulate --road my_track.csv                columns s,kappa,v_x [m, 1/m, m/s]
+  cargo fmu simulate --list                             every parameter with its value")]
+pub struct Args {
+    /// Manoeuvre (double_lane_change, general) or a CSV file
+    #[arg(long, default_value = "double_lane_change")]
+    pub road: String,
+    /// Communication step [s]: how often the two sides exchange values
+    #[arg(long, default_value_t = 0.001)]
+    pub step: f64,
+    /// End of the run [s]; without it the run ends with the road
+    #[arg(long)]
+    pub stop: Option<f64>,
+    /// A parameter, as plant.NAME=VALUE or controller.NAME=VALUE; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Write every sample to this file: names, units, then numbers
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Write plots to this file, one HTML page that needs no network
+    #[arg(long, value_name = "FILE")]
+    pub page: Option<PathBuf>,
+    /// Print the parameters and do nothing else
+    #[arg(long)]
+    pub list: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let settings = Settings::new(&args.road, &args.set)?;
+    if args.list {
+        for line in table(&settings.list()?) {
+            output.line(&line);
+        }
+        return Ok(());
+    }
+    ensure!(args.step > 0.0 && args.step <= 1.0, "the step must be above 0 and at most 1 s, got {}", args.step);
+    let (mut plant, mut controller) = build(&settings)?;
+    let end = args.stop.unwrap_or_else(|| plant.road().duration());
+    let bar = output.bar("driving", 1000);
+    let begin = Instant::now();
+    let recording = native::drive(&mut plant, &mut controller, args.step, args.stop, |t| {
+        // The bar's own thousand parts: a fraction of a run needs no more.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000")]
+        bar.set_position((1000.0 * t / end) as u64);
+    })?;
+    bar.finish_and_clear();
+    summary(args, &settings, &recording, begin.elapsed().as_secs_f64(), output);
+    save(args, &settings, &recording, output)
+}
+
+/// The two sides as the settings say.
+pub fn build(settings: &Settings) -> Result<(Vehicle, Controller)> {
+    let road = road(&settings.road, &settings.plant)?;
+    let plant = Vehicle::new(settings.plant.clone(), road)?;
+    let controller = Controller::new(settings.controller.clone(), 0.0)?;
+    Ok((plant, controller))
+}
+
+/// A manoeuvre by its name, or a road from a file.
+fn road(name: &str, parameters: &vehicle::Parameters) -> Result<Road> {
+    let file = Path::new(name);
+    if file.is_file() {
+        return Road::from_csv(&read_text(file)?).with_context(|| format!("in {name}"));
+    }
+    Road::named(name, parameters).context("neither a manoeuvre nor a file")
+}
+
+fn summary(args: &Args, settings: &Settings, run: &Recording, seconds: f64, output: &Output) {
+    let last = |name: &str| run.column(name).last().copied().unwrap_or_default();
+    let status = run.column("status");
+    let degraded = status.iter().filter(|&&status| status >= 2.0).count();
+    output.line(&format!(
+        "{} over {:.0} m and {:.2} s at steps of {} ms, in {seconds:.2} s of computing\n",
+        settings.road,
+        last("s"),
+        last("t"),
+        args.step * 1e3
+    ));
+    for line in tracking_table(&[("this run", Tracking::of(run))]) {
+        output.line(&line);
+    }
+    let grip = run.column("grip_usage").into_iter().fold(0.0, f64::max);
+    output.line(&format!("\ngrip in use, largest      {:>5.0} %", 100.0 * grip));
+    if degraded > 0 {
+        output
+            .line(&format!("degraded answers          {degraded} of {} samples have status 2 or worse", status.len()));
+    }
+}
+
+fn save(args: &Args, settings: &Settings, recording: &Recording, output: &Output) -> Result<()> {
+    if let Some(file) = &args.csv {
+        write_whole(file, recording.csv().as_bytes())?;
+        output.line(&format!("samples: {}", shown(file)));
+    }
+    if let Some(file) = &args.page {
+        let lead = format!("{} at communication steps of {} ms.", settings.road, args.step * 1e3);
+        let runs = [("paper (lane change)", PAPER), ("this run", Tracking::of(recording))];
+        let picture = recording.thinned(recording.rows.len() / 1500);
+        write_whole(file, page("Closed loop", &lead, &picture, &runs).as_bytes())?;
+        output.line(&format!("plots: {}", shown(file)));
+    }
+    Ok(())
+}

@@ -1,0 +1,132 @@
+//! `--set side.name=value` on the flat parameter structures: names and types come from the structures themselves.
+
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+/// Parameters of both sides, and the road.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Manoeuvre or file.
+    pub road: String,
+    /// Parameters of the plant.
+    pub plant: vehicle::Parameters,
+    /// Parameters of the controller.
+    pub controller: lpv_mpc::Parameters,
+}
+
+impl Settings {
+    /// The defaults with the given assignments.
+    ///
+    /// The plant's preview takes the controller's sample time unless it is set itself: two clocks that differ are a trap.
+    pub fn new(road: &str, assignments: &[String]) -> Result<Self> {
+        let mut road = road.to_owned();
+        let mut plant = fields(&vehicle::Parameters::default())?;
+        let mut controller = fields(&lpv_mpc::Parameters::default())?;
+        let mut own_preview = false;
+        for assignment in assignments {
+            let (name, value) =
+                assignment.split_once('=').with_context(|| format!("expected NAME=VALUE, got {assignment}"))?;
+            match name.trim().split_once('.') {
+                Some(("plant", "road")) => value.trim().clone_into(&mut road),
+                Some(("plant", field)) => {
+                    own_preview |= field == "preview_step";
+                    assign(&mut plant, "plant", field, value.trim())?;
+                }
+                Some(("controller", field)) => assign(&mut controller, "controller", field, value.trim())?,
+                _ => bail!("a name begins with plant. or controller., got {name}"),
+            }
+        }
+        let mut settings = Self { road, plant: read(plant)?, controller: read(controller)? };
+        if !own_preview {
+            settings.plant.preview_step = settings.controller.t_s;
+        }
+        Ok(settings)
+    }
+
+    /// All names with their values, for people who look for one.
+    pub fn list(&self) -> Result<Vec<Vec<String>>> {
+        let mut rows = vec![vec!["plant.road".to_owned(), self.road.clone()]];
+        for (side, fields) in [("plant", fields(&self.plant)?), ("controller", fields(&self.controller)?)] {
+            for (name, value) in fields {
+                let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                rows.push(vec![format!("{side}.{name}"), value]);
+            }
+        }
+        Ok(rows)
+    }
+}
+
+fn fields(parameters: &impl Serialize) -> Result<Map<String, Value>> {
+    match serde_json::to_value(parameters)? {
+        Value::Object(fields) => Ok(fields),
+        other => bail!("parameters are not a flat structure but {other}"),
+    }
+}
+
+fn read<T: DeserializeOwned>(fields: Map<String, Value>) -> Result<T> {
+    Ok(serde_json::from_value(Value::Object(fields))?)
+}
+
+/// Puts a text into a field, as what the field is.
+fn assign(fields: &mut Map<String, Value>, side: &str, name: &str, text: &str) -> Result<()> {
+    let Some(old) = fields.get_mut(name) else {
+        let nearest = fields
+            .keys()
+            .min_by_key(|known| strsim::damerau_levenshtein(known, name))
+            .map(|known| format!(", did you mean {side}.{known}?"))
+            .unwrap_or_default();
+        bail!("unknown parameter {side}.{name}{nearest}");
+    };
+    let wrong = |kind: &str| format!("{side}.{name} takes {kind}, got {text}");
+    *old = match old {
+        Value::Bool(_) => Value::Bool(text.parse().with_context(|| wrong("true or false"))?),
+        Value::Number(number) if number.is_f64() => {
+            let value: f64 = text.parse().with_context(|| wrong("a number"))?;
+            serde_json::Number::from_f64(value).map(Value::Number).with_context(|| wrong("a finite number"))?
+        }
+        Value::Number(_) => {
+            let value: i64 = text.parse().with_context(|| wrong("a whole number"))?;
+            Value::from(value)
+        }
+        _ => Value::String(text.to_owned()),
+    };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(assignments: &[&str]) -> Result<Settings> {
+        let assignments: Vec<String> = assignments.iter().map(|&text| text.to_owned()).collect();
+        Settings::new("general", &assignments)
+    }
+
+    #[test]
+    fn values_arrive_as_what_they_are() {
+        let settings = set(&["plant.speed=16", "controller.horizon = 20", "plant.seed=-3"]).unwrap();
+        assert_eq!((settings.plant.speed, settings.plant.seed), (16.0, -3));
+        assert_eq!(settings.controller.horizon, 20);
+    }
+
+    #[test]
+    fn the_preview_follows_the_sample_time_unless_it_is_set() {
+        assert_eq!(set(&["controller.t_s=0.05"]).unwrap().plant.preview_step, 0.05);
+        let own = set(&["plant.preview_step=0.02", "controller.t_s=0.05"]).unwrap();
+        assert_eq!(own.plant.preview_step, 0.02);
+    }
+
+    #[test]
+    fn a_misspelt_name_is_answered_with_the_nearest() {
+        let message = |assignment| set(&[assignment]).unwrap_err().to_string();
+        assert_eq!(
+            message("controller.horzion=5"),
+            "unknown parameter controller.horzion, did you mean controller.horizon?"
+        );
+        assert_eq!(message("speed=5"), "a name begins with plant. or controller., got speed");
+        assert_eq!(message("plant.m=heavy"), "plant.m takes a number, got heavy");
+        assert_eq!(message("plant.m"), "expected NAME=VALUE, got plant.m");
+    }
+}
