@@ -1,0 +1,283 @@
+//! One slave: its state, and the functions of the standard on Rust types. The C interface adds pointers, nothing else.
+
+use std::ffi::CString;
+use std::path::PathBuf;
+
+use crate::clock::Clock;
+use crate::error::Error;
+use crate::lifecycle::Phase;
+use crate::model::{Category, Experiment, InputDerivative, Log, Model, Outcome, Step};
+use crate::state::State;
+use crate::table::{Role, Row};
+use crate::value::{Kind, Scalar};
+
+/// A slave and what the importer gave it.
+pub(crate) struct Instance<M: Model, L: Log> {
+    pub state: State<M>,
+    pub log: L,
+    resources: Option<PathBuf>,
+    /// The model as initialisation would leave it, when an output was read in initialisation mode.
+    ahead: Option<Box<M>>,
+    /// Strings that the importer may read until its next call.
+    strings: Vec<CString>,
+}
+
+impl<M: Model, L: Log> Instance<M, L> {
+    pub fn new(resources: Option<PathBuf>, log: L) -> Self {
+        Self { state: State::default(), log, resources, ahead: None, strings: Vec::new() }
+    }
+
+    pub fn setup_experiment(&mut self, start: f64, stop: Option<f64>) -> Result<(), Error> {
+        self.state.clock = Clock::new(start, stop)?;
+        Ok(())
+    }
+
+    pub fn enter_initialization_mode(&mut self) {
+        self.ahead = None;
+        self.state.phase = Phase::InitializationMode;
+    }
+
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Error> {
+        match self.ahead.take() {
+            Some(model) => self.state.model = *model,
+            None => initialize(&mut self.state.model, self.state.clock, self.resources.as_deref(), &mut self.log)?,
+        }
+        self.state.phase = Phase::StepComplete;
+        self.state.retune = false;
+        self.state.stale = true;
+        if self.log.enabled(Category::Event) {
+            self.log.log(Category::Event, &format!("initialised at {} s", self.state.clock.now));
+        }
+        Ok(())
+    }
+
+    pub fn terminate(&mut self) {
+        self.refresh();
+        self.state.phase = Phase::Terminated;
+    }
+
+    pub fn reset(&mut self) {
+        self.restore(State::default());
+    }
+
+    pub fn restore(&mut self, state: State<M>) {
+        self.ahead = None;
+        self.state = state;
+    }
+
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<Outcome, Error> {
+        self.state.clock.check_step(t, h, M::INFO.max_step)?;
+        let State { model, retune, stale, input_derivatives, .. } = &mut self.state;
+        if std::mem::take(retune) {
+            model.tune(&mut self.log).map_err(model_error)?;
+        }
+        *stale = true;
+        let outcome = model.step(&Step { t, h, input_derivatives }, &mut self.log).map_err(model_error)?;
+        input_derivatives.clear();
+        self.state.clock.now = t + h;
+        Ok(outcome)
+    }
+
+    /// Reads variables of one type and hands each value over with its position.
+    #[inline]
+    pub fn read(
+        &mut self,
+        references: &[u32],
+        kind: Kind,
+        mut deliver: impl FnMut(usize, Scalar<'_>),
+    ) -> Result<(), Error> {
+        for (position, &reference) in references.iter().enumerate() {
+            let (row, element) = variable::<M>(reference, kind)?;
+            if row.role.is_calculated() {
+                self.update(row, element)?;
+            }
+            let model = self.ahead.as_deref().filter(|_| row.role.is_calculated()).unwrap_or(&self.state.model);
+            deliver(position, row.read(model, element));
+        }
+        Ok(())
+    }
+
+    /// Writes variables of one type, all or none.
+    pub fn write<'v>(
+        &mut self,
+        references: &[u32],
+        kind: Kind,
+        fetch: impl Fn(usize) -> Result<Scalar<'v>, Error>,
+    ) -> Result<(), Error> {
+        for (position, &reference) in references.iter().enumerate() {
+            let (row, element) = variable::<M>(reference, kind)?;
+            self.check_settable(row, element)?;
+            let value = fetch(position)?;
+            if !row.permits(value) {
+                return Err(range_error(row, element, value));
+            }
+        }
+        for (position, &reference) in references.iter().enumerate() {
+            let (row, element) = variable::<M>(reference, kind)?;
+            let value = fetch(position)?;
+            let fits = row.set.is_some_and(|set| set(&mut self.state.model, element, value));
+            if !fits {
+                return Err(range_error(row, element, value));
+            }
+            self.state.retune |= row.role == Role::Tunable;
+        }
+        if !references.is_empty() {
+            self.state.stale = true;
+            self.ahead = None;
+        }
+        Ok(())
+    }
+
+    /// Reads strings and keeps them until the next call.
+    pub fn read_strings(&mut self, references: &[u32]) -> Result<&[CString], Error> {
+        let mut strings = std::mem::take(&mut self.strings);
+        strings.clear();
+        self.read(references, Kind::String, |_, value| {
+            let Scalar::String(text) = value else { unreachable!("read delivers values of the type asked for") };
+            // Texts come in through NUL-terminated strings; one made by the model ends at its first NUL, as it would in C.
+            let bytes = text.split('\0').next().unwrap_or_default();
+            strings.push(CString::new(bytes).expect("a piece without NUL has no NUL"));
+        })?;
+        self.strings = strings;
+        Ok(&self.strings)
+    }
+
+    pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<(), Error> {
+        let (row, element) = variable::<M>(reference, Kind::Real)?;
+        let unavailable = || Error::Derivative { name: row.element_name(element), order };
+        if row.role != Role::Input {
+            return Err(Error::Frozen {
+                name: row.element_name(element),
+                reason: "only inputs have input derivatives",
+            });
+        }
+        let order = u32::try_from(order).map_err(|_| unavailable())?;
+        if !(1..=M::INFO.max_input_derivative_order).contains(&order) {
+            return Err(unavailable());
+        }
+        if !value.is_finite() {
+            return Err(range_error(row, element, Scalar::Real(value)));
+        }
+        let derivatives = &mut self.state.input_derivatives;
+        match derivatives.iter_mut().find(|known| known.reference == reference && known.order == order) {
+            Some(known) => known.value = value,
+            None => derivatives.push(InputDerivative { reference, order, value }),
+        }
+        Ok(())
+    }
+
+    pub fn output_derivative(&mut self, reference: u32, order: i32) -> Result<f64, Error> {
+        let (row, element) = variable::<M>(reference, Kind::Real)?;
+        let unavailable = || Error::Derivative { name: row.element_name(element), order };
+        let positive = u32::try_from(order).map_err(|_| unavailable())?;
+        if row.role != Role::Output || !(1..=M::INFO.max_output_derivative_order).contains(&positive) {
+            return Err(unavailable());
+        }
+        self.update(row, element)?;
+        self.state.model.output_derivative(reference, positive).ok_or_else(unavailable)
+    }
+
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<(), Error> {
+        if !M::INFO.directional_derivative {
+            return Err(Error::Directional("this model provides none".to_owned()));
+        }
+        for &unknown in unknowns {
+            let (row, element) = variable::<M>(unknown, Kind::Real)?;
+            if !row.role.is_calculated() {
+                return Err(Error::Directional(format!("variable {} is not calculated", row.element_name(element))));
+            }
+            self.update(row, element)?;
+        }
+        for &known in knowns {
+            let (row, element) = variable::<M>(known, Kind::Real)?;
+            if row.role.is_calculated() {
+                return Err(Error::Directional(format!(
+                    "variable {} is not an independent one",
+                    row.element_name(element)
+                )));
+            }
+        }
+        if let Some(value) = seed.iter().find(|value| !value.is_finite()) {
+            return Err(Error::Directional(format!("seed {value} is not finite")));
+        }
+        let model = self.ahead.as_deref().unwrap_or(&self.state.model);
+        model
+            .directional_derivative(unknowns, knowns, seed, sensitivity)
+            .map_err(|error| Error::Directional(error.to_string()))
+    }
+
+    /// Makes a calculated variable readable.
+    #[inline]
+    fn update(&mut self, row: &Row<M>, element: usize) -> Result<(), Error> {
+        match self.state.phase {
+            Phase::StepComplete if row.lazy && self.state.stale => self.refresh(),
+            Phase::InitializationMode if self.ahead.is_none() => {
+                let mut model = Box::new(self.state.model.clone());
+                initialize(model.as_mut(), self.state.clock, self.resources.as_deref(), &mut self.log).map_err(
+                    |error| Error::Unavailable { name: row.element_name(element), reason: error.to_string() },
+                )?;
+                model.refresh();
+                self.ahead = Some(model);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn refresh(&mut self) {
+        if self.state.stale {
+            self.state.model.refresh();
+            self.state.stale = false;
+        }
+    }
+
+    fn check_settable(&self, row: &Row<M>, element: usize) -> Result<(), Error> {
+        let reason = match row.role {
+            Role::Output | Role::Local => "it is calculated",
+            Role::Parameter if self.state.phase == Phase::StepComplete => {
+                "it is a fixed parameter and initialisation is over"
+            }
+            _ => return Ok(()),
+        };
+        Err(Error::Frozen { name: row.element_name(element), reason })
+    }
+}
+
+fn initialize<M: Model>(
+    model: &mut M,
+    clock: Clock,
+    resources: Option<&std::path::Path>,
+    log: &mut dyn Log,
+) -> Result<(), Error> {
+    model.initialize(&Experiment { start: clock.start, stop: clock.stop, resources }, log).map_err(model_error)
+}
+
+#[inline]
+fn variable<M: Model>(reference: u32, kind: Kind) -> Result<(&'static Row<M>, usize), Error> {
+    let (row, element) = M::table().lookup(reference).ok_or(Error::UnknownReference(reference))?;
+    if row.kind != kind {
+        return Err(Error::Type { name: row.element_name(element), actual: row.kind.name(), wanted: kind.name() });
+    }
+    Ok((row, element))
+}
+
+fn range_error<M>(row: &Row<M>, element: usize, value: Scalar<'_>) -> Error {
+    let value = match value {
+        Scalar::Real(value) => format!("{value:?}"),
+        Scalar::Integer(value) => value.to_string(),
+        Scalar::Boolean(value) => value.to_string(),
+        Scalar::String(value) => format!("{value:?}"),
+    };
+    Error::Range { name: row.element_name(element), value, range: row.range() }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err wants")]
+fn model_error(error: impl std::fmt::Display) -> Error {
+    Error::Model(error.to_string())
+}
