@@ -26,16 +26,9 @@ fn plant(c: &mut Criterion) {
     let (parameters, road) = (vehicle.parameters(), vehicle.road());
     let dynamics = Dynamics::new(parameters);
     let x = vehicle.truth().x;
-    let drive = Drive {
-        delta: 0.0,
-        sin_delta: 0.0,
-        cos_delta: 1.0,
-        a_x: inputs.a_x,
-        wind_x: 0.0,
-        wind_y: 0.0,
-        mu_scale: 1.0,
-    }
-    .steered(inputs.delta);
+    let drive =
+        Drive { delta: 0.0, sin_delta: 0.0, cos_delta: 1.0, a_x: inputs.a_x, wind_x: 0.0, wind_y: 0.0, mu_scale: 1.0 }
+            .steered(inputs.delta);
 
     c.bench_function("four right-hand sides", |b| {
         b.iter(|| {

@@ -30,6 +30,16 @@ pub struct Actuator {
     pub max: f64,
 }
 
+impl Actuator {
+    /// How much of a small change of the command `value` reaches the position at once: 1, or 0 behind a delay, a lag, a
+    /// rate limit or a position limit.
+    #[must_use]
+    pub fn gain(&self, value: f64) -> f64 {
+        let direct = self.delay == 0.0 && self.tau == 0.0 && self.rate_max == 0.0;
+        f64::from(u8::from(direct && value > self.min && value < self.max))
+    }
+}
+
 /// A command that is linear in time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ramp {
@@ -62,6 +72,15 @@ impl Piece {
         match *self {
             Self::Straight(Ramp { value, slope }) => value + slope * t,
             Self::Decay { ramp, amplitude, tau } => ramp.value + ramp.slope * t + amplitude * (-t / tau).exp(),
+        }
+    }
+
+    /// Rate of the position at the start of the piece.
+    #[must_use]
+    pub fn rate(&self) -> f64 {
+        match *self {
+            Self::Straight(Ramp { slope, .. }) => slope,
+            Self::Decay { ramp, amplitude, tau } => ramp.slope - amplitude / tau,
         }
     }
 

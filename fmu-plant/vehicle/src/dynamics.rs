@@ -166,8 +166,8 @@ impl Dynamics {
     pub fn stiffness<D: Scalar>(&self, evaluation: &Evaluation<D>) -> (D, D) {
         let Evaluation { alpha_f, alpha_r, f_yf, f_yr, peak_f, peak_r, .. } = *evaluation;
         (
-            tyre::secant_stiffness(f_yf, alpha_f, self.front.cornering_stiffness(peak_f.re())),
-            tyre::secant_stiffness(f_yr, alpha_r, self.rear.cornering_stiffness(peak_r.re())),
+            tyre::secant_stiffness(f_yf, alpha_f, self.front.cornering_stiffness(peak_f)),
+            tyre::secant_stiffness(f_yr, alpha_r, self.rear.cornering_stiffness(peak_r)),
         )
     }
 }

@@ -29,11 +29,13 @@ pub mod parameters;
 mod plant;
 pub mod road;
 mod scalar;
+mod signals;
 pub mod tyre;
 
 pub use error::Error;
 pub use noise::Measurement;
 pub use parameters::Parameters;
-pub use plant::{Inputs, Outputs, Vehicle};
+pub use plant::{STEP_MAX, State, Vehicle};
 pub use road::{PREVIEW, Preview, Road};
 pub use scalar::Scalar;
+pub use signals::{Inputs, Outputs};

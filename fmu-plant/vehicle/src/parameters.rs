@@ -133,18 +133,31 @@ impl Default for Parameters {
     }
 }
 
-/// A parameter's name, how to read it, its smallest and its largest value.
-pub type Range = (&'static str, fn(&Parameters) -> f64, f64, f64);
-
 macro_rules! ranges {
     ($($field:ident $min:expr, $max:expr;)*) => {
-        &[$((stringify!($field), |p: &Parameters| p.$field, $min, $max)),*]
+        /// The smallest value of each parameter.
+        pub const MIN: Self =
+            Self { tyre: Preset::DryAsphalt, crosswind: false, seed: i32::MIN, $($field: $min),* };
+        /// The largest value of each parameter.
+        pub const MAX: Self =
+            Self { tyre: Preset::Custom, crosswind: true, seed: i32::MAX, $($field: $max),* };
+
+        /// Refuses a value outside its range, by name.
+        pub fn validate(&self) -> Result<(), Error> {
+            $(
+                let (value, min, max) = (self.$field, Self::MIN.$field, Self::MAX.$field);
+                if !(min..=max).contains(&value) {
+                    return Err(Error::Parameter { name: stringify!($field), value, min, max });
+                }
+            )*
+            Ok(())
+        }
     };
 }
 
+// From a go-kart to a bus, from ice to racing slicks.
 impl Parameters {
-    /// The ranges that [`Parameters::validate`] enforces: from a go-kart to a bus, from ice to racing slicks.
-    pub const RANGES: &'static [Range] = ranges! {
+    ranges! {
         m 100.0, 50_000.0;
         i_z 50.0, 500_000.0;
         l_f 0.2, 10.0;
@@ -177,17 +190,6 @@ impl Parameters {
         e_y_0 -20.0, 20.0;
         e_psi_0 -3.2, 3.2;
         v_x_0 -1.0, 70.0;
-    };
-
-    /// Refuses a value outside its range, by name.
-    pub fn validate(&self) -> Result<(), Error> {
-        for &(name, read, min, max) in Self::RANGES {
-            let value = read(self);
-            if !(min..=max).contains(&value) {
-                return Err(Error::Parameter { name, value, min, max });
-            }
-        }
-        Ok(())
     }
 }
 

@@ -1,126 +1,17 @@
 //! The vehicle on its road, advanced one communication step at a time.
 
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Error, Measurement, Parameters, Preview, Road,
-    actuators::{self, Actuator, Ramp},
-    dynamics::{self, Drive, Dynamics, E_PSI, E_Y, Evaluation, NX, PSI, S, V_X, V_Y, X, Y, YAW_RATE},
+    Error, Inputs, Measurement, Outputs, Parameters, Preview, Road, Scalar,
+    actuators::{self, Actuator, Piece, Ramp},
+    dynamics::{self, Drive, Dynamics, E_PSI, E_Y, NX, PSI, S, V_X, V_Y, X, Y, YAW_RATE},
     integrate, noise,
 };
 
 /// Longest communication step [s]: a minute holds every command longer than any use, and bounds the work of one call.
 pub const STEP_MAX: f64 = 60.0;
-
-/// What the world does to the vehicle during one communication step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Inputs {
-    /// Front steering angle command [rad].
-    pub delta: f64,
-    /// Longitudinal acceleration command; negative is braking [m/s2].
-    pub a_x: f64,
-    /// Wind, added to the manoeuvre's own [m/s].
-    pub wind_speed: f64,
-    /// Direction it blows to, in the road frame at the start [rad].
-    pub wind_direction: f64,
-    /// Factor on the friction [1].
-    pub mu_scale: f64,
-    /// Rate of the steering command inside the step [rad/s].
-    pub delta_rate: f64,
-    /// Rate of the acceleration command inside the step [m/s3].
-    pub a_x_rate: f64,
-}
-
-impl Default for Inputs {
-    fn default() -> Self {
-        Self {
-            delta: 0.0,
-            a_x: 0.0,
-            wind_speed: 0.0,
-            wind_direction: 0.0,
-            mu_scale: 1.0,
-            delta_rate: 0.0,
-            a_x_rate: 0.0,
-        }
-    }
-}
-
-/// Name, how to read it, smallest and largest value of an input.
-type InputRange = (&'static str, fn(&Inputs) -> f64, f64, f64);
-
-impl Inputs {
-    /// The ranges that [`Vehicle::advance`] enforces. Commands may exceed what the actuators reach: those saturate.
-    pub const RANGES: &'static [InputRange] = &[
-        ("delta", |i| i.delta, -10.0, 10.0),
-        ("a_x", |i| i.a_x, -100.0, 100.0),
-        ("wind_speed", |i| i.wind_speed, -100.0, 100.0),
-        ("wind_direction", |i| i.wind_direction, -100.0, 100.0),
-        ("mu_scale", |i| i.mu_scale, 0.0, 2.0),
-        ("delta_rate", |i| i.delta_rate, -1e4, 1e4),
-        ("a_x_rate", |i| i.a_x_rate, -1e5, 1e5),
-    ];
-
-    fn validate(&self) -> Result<(), Error> {
-        for &(name, read, min, max) in Self::RANGES {
-            let value = read(self);
-            if !(min..=max).contains(&value) {
-                return Err(Error::Input { name, value, min, max });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Everything that the plant shows besides the measurement and the preview.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outputs {
-    /// Longitudinal velocity, body frame [m/s].
-    pub v_x_true: f64,
-    /// Lateral velocity, body frame [m/s].
-    pub v_y_true: f64,
-    /// Yaw rate [rad/s].
-    pub yaw_rate_true: f64,
-    /// Lateral error [m].
-    pub e_y_true: f64,
-    /// Heading error [rad].
-    pub e_psi_true: f64,
-    /// Global position along the start of the road [m].
-    pub x: f64,
-    /// Global position to the left of it [m].
-    pub y: f64,
-    /// Global heading [rad].
-    pub psi: f64,
-    /// Arc length along the path [m].
-    pub s: f64,
-    /// Lateral acceleration of the centre of gravity, body frame [m/s2].
-    pub a_lat: f64,
-    /// Longitudinal acceleration of the centre of gravity, body frame [m/s2].
-    pub a_long: f64,
-    /// Front slip angle [rad].
-    pub alpha_f: f64,
-    /// Rear slip angle [rad].
-    pub alpha_r: f64,
-    /// Lateral force of the front axle [N].
-    pub f_yf: f64,
-    /// Lateral force of the rear axle [N].
-    pub f_yr: f64,
-    /// Secant stiffness of the front axle [N/rad].
-    pub c_f_true: f64,
-    /// Secant stiffness of the rear axle [N/rad].
-    pub c_r_true: f64,
-    /// Steering angle after the actuator [rad].
-    pub delta_actual: f64,
-    /// Acceleration after the actuator [m/s2].
-    pub a_x_actual: f64,
-    /// Share of the grip that the more loaded axle uses, 0 to 1 [1].
-    pub grip_usage: f64,
-    /// Speed of the wind where the vehicle is [m/s].
-    pub wind_speed_actual: f64,
-    /// Whether the end of the road is reached.
-    pub finished: bool,
-    /// Cones hit so far.
-    pub cones_hit: i32,
-}
 
 /// What changes while the vehicle drives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -263,7 +154,7 @@ impl Vehicle {
         self.state.steering.command(&self.derived.steering, start, delta(0.0));
         self.state.drive.command(&self.derived.drive, start, a_x(0.0));
 
-        let wind = wind(inputs);
+        let wind = wind(inputs.wind_speed, inputs.wind_direction);
         let mut done = 0.0;
         while done < h {
             let (now, left) = (start + done, h - done);
@@ -288,19 +179,12 @@ impl Vehicle {
     }
 
     /// Integrates over one piece of both actuators.
-    fn integrate(
-        &mut self,
-        length: f64,
-        steer: &actuators::Piece,
-        push: &actuators::Piece,
-        wind: [f64; 2],
-        mu_scale: f64,
-    ) {
+    fn integrate(&mut self, length: f64, steer: &Piece, push: &Piece, wind: [f64; 2], mu_scale: f64) {
         let Self { derived: Derived { dynamics, .. }, road, state, .. } = self;
         let n = integrate::count(length);
         let h = length / f64::from(n);
         let still = steer.is_constant() && push.is_constant();
-        let at = |t: f64| drive(steer.at(t), push.at(t), wind, mu_scale);
+        let at = |t: f64| drive((steer.at(t), push.at(t)), wind, mu_scale);
         let mut drives = [at(0.0); 3];
         for i in 0..n {
             if !still {
@@ -342,58 +226,74 @@ impl Vehicle {
         self.road.preview(self.state.x[S], self.parameters.preview_step)
     }
 
-    /// Derivatives and forces at the present state and actuator positions.
-    #[must_use]
-    pub fn evaluate(&self) -> Evaluation<f64> {
-        let State { x, steering, drive: push, inputs, .. } = &self.state;
-        let drive = drive(steering.position, push.position, wind(inputs), inputs.mu_scale);
-        self.derived.dynamics.evaluate(&self.road, x, &drive)
-    }
-
-    /// Everything else that the plant shows.
+    /// Everything else that the plant shows, under the inputs of the last step.
     #[must_use]
     pub fn outputs(&self) -> Outputs {
-        let State { x, steering, drive, .. } = &self.state;
-        let evaluation = self.evaluate();
-        let Evaluation { x_dot, alpha_f, alpha_r, f_yf, f_yr, peak_f, peak_r, wind } = evaluation;
-        let (c_f_true, c_r_true) = self.derived.dynamics.stiffness(&evaluation);
-        let usage = |force: f64, peak: f64| if peak > 0.0 { (force / peak).abs() } else { 1.0 };
-        Outputs {
-            v_x_true: x[V_X],
-            v_y_true: x[V_Y],
-            yaw_rate_true: x[YAW_RATE],
-            e_y_true: x[E_Y],
-            e_psi_true: x[E_PSI],
-            x: x[X],
-            y: x[Y],
-            psi: x[PSI],
-            s: x[S],
-            a_lat: x_dot[V_Y] + x[V_X] * x[YAW_RATE],
-            a_long: x_dot[V_X] - x[V_Y] * x[YAW_RATE],
-            alpha_f,
-            alpha_r,
-            f_yf,
-            f_yr,
-            c_f_true,
-            c_r_true,
-            delta_actual: steering.position,
-            a_x_actual: drive.position,
-            // A linear tyre can exceed the peak; the share is then all of it.
-            grip_usage: usage(f_yf, peak_f).max(usage(f_yr, peak_r)).min(1.0),
-            wind_speed_actual: wind[0].hypot(wind[1]),
-            finished: x[S] >= self.road.length(),
-            cones_hit: 0,
-        }
+        self.outputs_under(&self.state.inputs)
+    }
+
+    /// Everything else that the plant shows, if `inputs` acted now.
+    #[must_use]
+    pub fn outputs_under(&self, inputs: &Inputs) -> Outputs {
+        let (steer, push) = self.pieces(inputs);
+        let wind = wind(inputs.wind_speed, inputs.wind_direction);
+        self.signals(&self.state.x, (steer.at(0.0), push.at(0.0)), wind, inputs.mu_scale)
+    }
+
+    /// How the outputs change with the inputs along the direction `seed` (its rates are ignored), exactly, by dual
+    /// numbers. A command moves its actuator at once only if that has neither delay nor lag nor rate limit.
+    #[must_use]
+    pub fn outputs_along(&self, inputs: &Inputs, seed: &Inputs) -> Outputs {
+        let (steer, push) = self.pieces(inputs);
+        let Derived { steering, drive, .. } = &self.derived;
+        let dual = |value: f64, along: f64| Dual64::new(value, along);
+        let actuators = (
+            dual(steer.at(0.0), seed.delta * steering.gain(inputs.delta)),
+            dual(push.at(0.0), seed.a_x * drive.gain(inputs.a_x)),
+        );
+        let wind = wind(dual(inputs.wind_speed, seed.wind_speed), dual(inputs.wind_direction, seed.wind_direction));
+        let x = self.state.x.map(Dual64::from_re);
+        self.signals(&x, actuators, wind, dual(inputs.mu_scale, seed.mu_scale)).tangent()
+    }
+
+    /// Time derivatives of the outputs under `inputs`, exactly, by dual numbers.
+    #[must_use]
+    pub fn outputs_rate(&self, inputs: &Inputs) -> Outputs {
+        let (steer, push) = self.pieces(inputs);
+        let input_wind = wind(inputs.wind_speed, inputs.wind_direction);
+        let drive = drive((steer.at(0.0), push.at(0.0)), input_wind, inputs.mu_scale);
+        let x_dot = self.derived.dynamics.evaluate(&self.road, &self.state.x, &drive).x_dot;
+        let x = std::array::from_fn(|i| Dual64::new(self.state.x[i], x_dot[i]));
+        let actuators = (Dual64::new(steer.at(0.0), steer.rate()), Dual64::new(push.at(0.0), push.rate()));
+        self.signals(&x, actuators, input_wind.map(Dual64::from_re), Dual64::from_re(inputs.mu_scale)).tangent()
+    }
+
+    /// How both actuators move from now on under `inputs`.
+    fn pieces(&self, inputs: &Inputs) -> (Piece, Piece) {
+        let Self { state: State { steering, drive, time, .. }, derived, .. } = self;
+        let delta = Ramp { value: inputs.delta, slope: inputs.delta_rate };
+        let a_x = Ramp { value: inputs.a_x, slope: inputs.a_x_rate };
+        (
+            steering.piece(&derived.steering, *time, delta, STEP_MAX).0,
+            drive.piece(&derived.drive, *time, a_x, STEP_MAX).0,
+        )
+    }
+
+    fn signals<D: Scalar>(&self, x: &[D; NX], actuators: (D, D), wind: [D; 2], mu_scale: D) -> Outputs<D> {
+        let Derived { dynamics, .. } = &self.derived;
+        let evaluation = dynamics.evaluate(&self.road, x, &drive(actuators, wind, mu_scale));
+        let finished = x[S].re() >= self.road.length();
+        Outputs::new(dynamics, x, &evaluation, actuators, (finished, 0))
     }
 }
 
 /// The input wind as a vector in the global frame [m/s].
-fn wind(inputs: &Inputs) -> [f64; 2] {
-    let (sin, cos) = inputs.wind_direction.sin_cos();
-    [inputs.wind_speed * cos, inputs.wind_speed * sin]
+fn wind<D: Scalar>(speed: D, direction: D) -> [D; 2] {
+    let (sin, cos) = direction.sin_cos();
+    [speed * cos, speed * sin]
 }
 
 /// What acts on the vehicle at these actuator positions.
-fn drive(delta: f64, a_x: f64, [wind_x, wind_y]: [f64; 2], mu_scale: f64) -> Drive<f64> {
-    Drive { delta, sin_delta: 0.0, cos_delta: 1.0, a_x, wind_x, wind_y, mu_scale }.steered(delta)
+fn drive<D: Scalar>((delta, a_x): (D, D), [wind_x, wind_y]: [D; 2], mu_scale: D) -> Drive<D> {
+    Drive { delta, sin_delta: delta, cos_delta: delta, a_x, wind_x, wind_y, mu_scale }.steered(delta)
 }

@@ -100,11 +100,10 @@ impl Axle {
     }
 
     /// Slope of the force at zero slip [N/rad] with the peak `d` [N].
-    #[must_use]
-    pub fn cornering_stiffness(&self, d: f64) -> f64 {
+    pub fn cornering_stiffness<D: Scalar>(&self, d: D) -> D {
         match *self {
-            Self::MagicFormula(Pacejka { b, c, .. }) => b * c * d,
-            Self::Linear(stiffness) => stiffness,
+            Self::MagicFormula(Pacejka { b, c, .. }) => d * (b * c),
+            Self::Linear(stiffness) => D::from(stiffness),
         }
     }
 }
@@ -113,7 +112,7 @@ impl Axle {
 ///
 /// The paper's `F / alpha` is undefined there; this is `(F a + c_0 e^2) / (a^2 + e^2)` with `e` = 1e-6 rad, far below any
 /// slip that matters.
-pub fn secant_stiffness<D: Scalar>(force: D, alpha: D, c_0: f64) -> D {
+pub fn secant_stiffness<D: Scalar>(force: D, alpha: D, c_0: D) -> D {
     const EPSILON_SQUARED: f64 = 1e-12;
     (force * alpha + c_0 * EPSILON_SQUARED) / (alpha * alpha + EPSILON_SQUARED)
 }

@@ -30,7 +30,7 @@ fn driven(parameters: &Parameters, road: &str, samples: u32, substeps: &[u32]) -
         let inputs = driver::command(&vehicles[0]);
         for (vehicle, &n) in vehicles.iter_mut().zip(substeps) {
             for _ in 0..n {
-                vehicle.advance(T_S / f64::from(n), &inputs).unwrap();
+                vehicle.advance(T_S / f64::from(n), &inputs).expect("the driver stays in range");
             }
         }
     }
@@ -43,7 +43,6 @@ fn error_after_the_lane_change_is_below_1e_7() {
     let vehicles = driven(&Parameters::default(), "double_lane_change", 420, &[33, 660]);
     assert!(vehicles[0].outputs().s > 190.0, "only {} m", vehicles[0].outputs().s);
     let error = distance(&vehicles[0], &vehicles[1]);
-    println!("error {error:e}");
     assert!(error < 1e-9, "{error}");
 }
 
@@ -52,7 +51,6 @@ fn the_lane_change_is_driven_at_all() {
     let mut worst: f64 = 0.0;
     let mut vehicle = vehicle("double_lane_change", Parameters::default());
     drive(&mut vehicle, 440, 1, |v| worst = worst.max(v.outputs().e_y_true.abs())).unwrap();
-    println!("worst {worst}");
     assert!(worst < 0.5, "{worst} m");
     assert!(vehicle.outputs().finished);
 }
@@ -64,7 +62,6 @@ fn communication_steps_that_divide_the_sample_time_agree() {
             let vehicles = driven(&parameters, road, 420, &[1, 33, 2, 3, 11, 66]);
             for other in &vehicles[1..] {
                 let error = distance(&vehicles[0], other);
-                println!("{name} {road} {error:e}");
                 assert!(error < 1e-9, "{name}, {road}: {error}");
                 let (a, b) = (vehicles[0].measurement(), other.measurement());
                 assert!((a.e_y - b.e_y).abs() < 1e-9, "{name}, {road}: noise differs");

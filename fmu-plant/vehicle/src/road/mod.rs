@@ -23,12 +23,18 @@ pub const PREVIEW: usize = 41;
 pub const NAMES: [&str; 2] = ["double_lane_change", "general"];
 
 /// Curvature and speed of the path now and at the next 40 sample times.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Preview {
     /// Curvature, positive to the left [1/m].
     pub kappa_ref: SVector<f64, PREVIEW>,
     /// Wanted speed [m/s].
     pub v_x_ref: SVector<f64, PREVIEW>,
+}
+
+impl Default for Preview {
+    fn default() -> Self {
+        Self { kappa_ref: SVector::zeros(), v_x_ref: SVector::zeros() }
+    }
 }
 
 /// A place and a heading in the global frame.
@@ -169,7 +175,7 @@ impl Road {
     /// seconds.
     #[must_use]
     pub fn preview(&self, s: f64, step: f64) -> Preview {
-        let mut preview = Preview { kappa_ref: SVector::zeros(), v_x_ref: SVector::zeros() };
+        let mut preview = Preview::default();
         let now = self.schedule.time(s);
         let mut ahead = s;
         let mut after = 0.0;

@@ -19,12 +19,7 @@ pub fn command(vehicle: &Vehicle) -> Inputs {
 
 /// Drives for `samples` sample times with `substeps` communication steps in each; `each` sees the vehicle after each
 /// sample.
-pub fn drive(
-    vehicle: &mut Vehicle,
-    samples: u32,
-    substeps: u32,
-    mut each: impl FnMut(&Vehicle),
-) -> Result<(), Error> {
+pub fn drive(vehicle: &mut Vehicle, samples: u32, substeps: u32, mut each: impl FnMut(&Vehicle)) -> Result<(), Error> {
     for _ in 0..samples {
         let inputs = command(vehicle);
         for _ in 0..substeps {
@@ -37,6 +32,6 @@ pub fn drive(
 
 /// A vehicle on a named road.
 pub fn vehicle(road: &str, parameters: Parameters) -> Vehicle {
-    let road = Road::named(road, &parameters).unwrap();
-    Vehicle::new(parameters, road).unwrap()
+    let road = Road::named(road, &parameters).expect("the road is known");
+    Vehicle::new(parameters, road).expect("the parameters are valid")
 }
