@@ -21,6 +21,7 @@ function draw() {
   for (const [id, plot] of Object.entries(plots)) {
     const axis = old => ({...old, gridcolor: rule, zerolinecolor: rule, automargin: true});
     const layout = {...plot.layout, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', font: {color: ink},
+      modebar: {bgcolor: 'rgba(0,0,0,0)', color: rule, activecolor: ink},
       xaxis: axis(plot.layout.xaxis), yaxis: axis(plot.layout.yaxis)};
     Plotly.react(id, plot.data, layout, {responsive: true, displaylogo: false});
   }
@@ -66,7 +67,7 @@ fn chart([id, title, note]: [&'static str; 3], [x, y]: [&str; 2], curves: Vec<Cu
     }
     plot.set_layout(
         Layout::new()
-            .margin(Margin::new().left(60).right(10).top(10).bottom(45))
+            .margin(Margin::new().left(60).right(10).top(30).bottom(45))
             .legend(Legend::new().x(0.0).y(1.12).orientation(plotly::common::Orientation::Horizontal))
             .x_axis(Axis::new().title(Title::with_text(x)))
             .y_axis(Axis::new().title(Title::with_text(y))),
