@@ -39,8 +39,7 @@ impl Clock {
         }
         // Importers that compute t as n * h differ from our t + h by the rounding of both: a few units in the last place.
         let tolerance = 64.0 * f64::EPSILON * t.abs().max(self.now.abs()).max(h);
-        // A NaN fails this comparison, as it should.
-        if !((t - self.now).abs() <= tolerance) {
+        if !t.is_finite() || (t - self.now).abs() > tolerance {
             return Err(Error::CommunicationPoint { given: t, expected: self.now });
         }
         let end = t + h;

@@ -277,7 +277,6 @@ fn range_error<M>(row: &Row<M>, element: usize, value: Scalar<'_>) -> Error {
     Error::Range { name: row.element_name(element), value, range: row.range() }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "the signature that map_err wants")]
 fn model_error(error: impl std::fmt::Display) -> Error {
     Error::Model(error.to_string())
 }

@@ -192,7 +192,7 @@ macro_rules! numbers {
 numbers! {
     get_real    set_real    GET_REAL    SET_REAL    Real    f64,     |value| value,                |value| value;
     get_integer set_integer GET_INTEGER SET_INTEGER Integer Integer, |value| value,                |value| value;
-    get_boolean set_boolean GET_BOOLEAN SET_BOOLEAN Boolean Boolean, |value| Boolean::from(value), |value| value != FALSE;
+    get_boolean set_boolean GET_BOOLEAN SET_BOOLEAN Boolean Boolean, Boolean::from,   |value| value != FALSE;
 }
 
 pub unsafe fn get_string<M: Model>(
