@@ -1,5 +1,6 @@
 //! The `fmi` crate as an independent importer: it reads the XML with its own schema types and calls the library through
 //! its own bindings. It needs libclang to build, so it is behind the feature `fmi-import`; `tests/run` provides that.
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};

@@ -1,4 +1,5 @@
 //! The packed FMUs against the cores that they are made of.
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 use std::sync::OnceLock;
 
@@ -19,10 +20,7 @@ fn packed() -> &'static Packed {
 /// Drives the FMUs and the cores with the same parameters, given as (side, name, value).
 fn both_ways(step: f64, values: &[(&str, &str, &str)]) -> (Recording, Recording) {
     let imported = drive(packed(), step, values, &QUIET).unwrap();
-    let assignments: Vec<String> = values
-        .iter()
-        .map(|(side, name, value)| format!("{side}.{name}={value}"))
-        .collect();
+    let assignments: Vec<String> = values.iter().map(|(side, name, value)| format!("{side}.{name}={value}")).collect();
     let settings = Settings::new("double_lane_change", &assignments).unwrap();
     let (mut plant, mut controller) = build(&settings).unwrap();
     let native = native::drive(&mut plant, &mut controller, step, None, |_| {}).unwrap();
@@ -67,9 +65,8 @@ fn fmus_and_cores_give_the_same_bits_with_lags_noise_and_wind() {
 
 #[test]
 fn packing_twice_gives_the_same_bytes() {
-    let bytes = |packed: &Packed| {
-        [&packed.controller, &packed.plant, &packed.system].map(|path| std::fs::read(path).unwrap())
-    };
+    let bytes =
+        |packed: &Packed| [&packed.controller, &packed.plant, &packed.system].map(|path| std::fs::read(path).unwrap());
     let first = bytes(packed());
     let second = bytes(&pack(&QUIET).unwrap());
     assert!(first == second, "an archive changed between two packs of the same sources");

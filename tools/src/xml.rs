@@ -25,14 +25,14 @@ impl Element {
 
     /// The element with one more attribute.
     #[must_use]
-    pub fn with(mut self, name: &str, value: impl ToString) -> Self {
+    pub fn with<V: ToString + ?Sized>(mut self, name: &str, value: &V) -> Self {
         self.attributes.push((name.to_owned(), value.to_string()));
         self
     }
 
     /// The element with one more attribute if there is a value.
     #[must_use]
-    pub fn with_some(self, name: &str, value: Option<impl ToString>) -> Self {
+    pub fn with_some<V: ToString + ?Sized>(self, name: &str, value: Option<&V>) -> Self {
         match value {
             Some(value) => self.with(name, value),
             None => self,
@@ -156,7 +156,7 @@ mod tests {
         let tree = Element::new("a:root")
             .with("text", "5 < 6 & \"quoted\" 'too' \u{e4}")
             .child(Element::new("empty"))
-            .extend([Element::new("list").child(Element::new("entry").with("n", 1))]);
+            .extend([Element::new("list").child(Element::new("entry").with("n", &1))]);
         let document = tree.document().unwrap();
         assert_eq!(Element::parse(&document).unwrap(), tree, "{document}");
     }

@@ -32,7 +32,7 @@ pub fn of(controller: &Interface, plant: &Interface, mut files: Files) -> Result
     let bindings = Element::new("ssd:ParameterBindings").extend(MANOEUVRES.iter().map(|manoeuvre| {
         Element::new("ssd:ParameterBinding")
             .with("type", "application/x-ssp-parameter-set")
-            .with("source", format!("resources/{}.ssv", manoeuvre.name))
+            .with("source", &format!("resources/{}.ssv", manoeuvre.name))
     }));
     let elements = Element::new("ssd:Elements")
         .child(component(PLANT, plant, &wires, Some(bindings), 0.0))
@@ -49,7 +49,8 @@ pub fn of(controller: &Interface, plant: &Interface, mut files: Files) -> Result
         .with("description", "LPV-MPC path tracking: the controller drives the vehicle")
         .child(elements)
         .child(connections);
-    let experiment = Element::new("ssd:DefaultExperiment").with("startTime", 0).with_some("stopTime", plant.stop_time);
+    let experiment =
+        Element::new("ssd:DefaultExperiment").with("startTime", &0).with_some("stopTime", plant.stop_time.as_ref());
     let description = Element::new("ssd:SystemStructureDescription")
         .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
         .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")
@@ -122,12 +123,12 @@ fn component(model: Model, interface: &Interface, wires: &[Wire], bindings: Opti
         .filter(|variable| variable.kind != Kind::String)
         .map(connector);
     let geometry =
-        Element::new("ssd:ElementGeometry").with("x1", left).with("y1", 0).with("x2", left + 60.0).with("y2", 60);
+        Element::new("ssd:ElementGeometry").with("x1", &left).with("y1", &0).with("x2", &(left + 60.0)).with("y2", &60);
     Element::new("ssd:Component")
         .with("name", model.component)
         .with("description", &interface.description)
         .with("type", "application/x-fmu-sharedlibrary")
-        .with("source", format!("resources/{}.fmu", model.name))
+        .with("source", &format!("resources/{}.fmu", model.name))
         .with("implementation", "CoSimulation")
         .child(Element::new("ssd:Connectors").extend(connectors))
         .child(geometry)
@@ -175,7 +176,7 @@ fn enumerations(interfaces: &[&Interface]) -> Option<Element> {
         .flat_map(|interface| &interface.enumerations)
         .map(|(name, items)| {
             let items =
-                items.iter().map(|item| Element::new("ssc:Item").with("name", &item.name).with("value", item.value));
+                items.iter().map(|item| Element::new("ssc:Item").with("name", &item.name).with("value", &item.value));
             Element::new("ssc:Enumeration").with("name", name).extend(items)
         })
         .collect();
@@ -188,7 +189,7 @@ fn parameter_set(manoeuvre: &Manoeuvre, plant: &Interface) -> Result<Element> {
         let variable = plant.variable(name)?;
         ensure!(variable.causality == "parameter", "{name} is no parameter of the plant");
         let typed = Element::new(&format!("ssv:{}", variable.kind.name()))
-            .with("value", value)
+            .with("value", *value)
             .with_some("unit", variable.unit.as_ref());
         parameters = parameters.child(Element::new("ssv:Parameter").with("name", name).child(typed));
     }
