@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::discretise::Hold;
+use crate::estimator::Estimator;
 use crate::ladder::{Status, safe_stop};
-use crate::latency::{Latency, Predicted};
-use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, Tyres, V_X, V_Y, YAW_RATE};
+use crate::latency::Latency;
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::mpc::{Mpc, NX_LAGS, vehicle_part};
-use crate::parameters::HORIZON_MAX;
+use crate::parameters::{Estimation, HORIZON_MAX};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
 
@@ -35,7 +36,6 @@ macro_rules! with_mpc {
 struct Beliefs {
     body: Body,
     tyres: Tyres,
-    disturbance: Disturbance,
 }
 
 /// Adaptive LPV-MPC of steering and speed.
@@ -45,6 +45,9 @@ pub struct Controller {
     beliefs: Beliefs,
     core: Core,
     latency: Latency,
+    estimator: Estimator,
+    /// Samples since speed and position on the path were last measured.
+    blind: usize,
     /// Time of the first sample [s].
     start: f64,
     /// Samples taken.
@@ -65,7 +68,9 @@ impl Controller {
         let tau = [p.tau_delta, p.tau_a_x];
         let tyres = p.nominal_tyres();
         Ok(Self {
-            beliefs: Beliefs { body: p.body(), tyres, disturbance: Disturbance::zeros() },
+            beliefs: Beliefs { body: p.body(), tyres },
+            estimator: Estimator::new(p.sensor_noise),
+            blind: 0,
             core: if tau == [0.0, 0.0] {
                 Core::Ideal(Box::new(Mpc::new(p)))
             } else {
@@ -98,6 +103,11 @@ impl Controller {
         Ok(())
     }
 
+    /// Samples taken so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
     /// What is visible now.
     pub fn output(&self) -> &Output {
         &self.output
@@ -114,36 +124,53 @@ impl Controller {
         if !(h > 0.0 && h.is_finite() && t.is_finite()) {
             return Err(Error::Step(h));
         }
-        self.latency.advance(t);
         let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);
         while self.start + self.samples as f64 * self.parameters.t_s < end {
             self.samples += 1;
-            self.sample(h, inputs);
+            self.sample(t, h, inputs);
             self.latency.send(t + h, self.u_prev);
         }
         Ok(())
     }
 
-    /// One sample: predict over the latency, plan, take the first command.
-    fn sample(&mut self, h: f64, inputs: &Inputs) {
-        let Self { parameters: p, beliefs, .. } = self;
-        let Beliefs { body, tyres, disturbance } = &*beliefs;
+    /// One sample with what was measured at `t` [s]: estimate, predict over the latency, plan, take the first command.
+    fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
+        let (duration, delivered) = self.latency.advance(t);
+        let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
+        let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-        let at: Predicted =
-            self.latency.predict(&inputs.state(), h, |s| inputs.curvature(s / p.t_s), body, tyres, disturbance);
+        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, tyres, &disturbance);
         let reference = inputs.reference((h + p.input_delay) / p.t_s);
         let u_prev = self.u_prev;
-        let (status, command) = with_mpc!(&mut self.core, mpc => {
-            let outcome = mpc.step(&at, &u_prev, &reference, &hold, body, tyres, disturbance);
+        let sighted = self.blind < p.horizon;
+        let (status, command) = with_mpc!(core, mpc => {
+            let outcome = mpc.step(&at, &u_prev, &reference, &hold, body, tyres, &disturbance);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
-            if mpc.plan.is_left() {
-                (Status::of(outcome), mpc.plan.u[0])
+            if mpc.plan.is_left() && sighted {
+                (Status::of(outcome, complete), mpc.plan.u[0])
             } else {
                 (Status::SafeStop, safe_stop(&u_prev, inputs.v_x, p))
             }
         });
         self.u_prev = command;
         self.publish(status);
+    }
+
+    /// State and disturbance at the measurement, and whether all of it was measured.
+    fn estimate(&mut self, inputs: &Inputs, duration: f64, delivered: &Input) -> (State, Disturbance, bool) {
+        let mut measured = inputs.state();
+        if self.parameters.estimation == Estimation::Measured {
+            return (measured, Disturbance::zeros(), true);
+        }
+        let usable = |i: usize| measured[i].is_finite();
+        self.blind = if usable(V_X) && usable(E_Y) && usable(E_PSI) { 0 } else { self.blind + 1 };
+        let complete = measured.iter().all(|z| z.is_finite());
+        if !self.parameters.v_y_measured {
+            measured[V_Y] = f64::NAN;
+        }
+        let Beliefs { body, tyres } = &self.beliefs;
+        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres);
+        (self.estimator.x, self.estimator.disturbance, complete)
     }
 
     fn publish(&mut self, status: Status) {

@@ -1,5 +1,7 @@
 //! What is done when no optimal plan can be had, in steps of growing severity.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
@@ -19,16 +21,31 @@ pub enum Status {
     Optimal,
     /// The plan is optimal to the tolerance of an interior point method, in the structured solver or in Clarabel.
     InteriorPoint,
+    /// The plan is optimal, but some measurement was missing or not finite and its estimate was used instead.
+    Estimated,
     /// No new plan; the previous one is executed further.
     PreviousPlan,
     /// Nothing of the previous plan is left: steering is held, the car brakes.
     SafeStop,
 }
 
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Optimal => "optimal",
+            Self::InteriorPoint => "optimal to the tolerance of an interior point method",
+            Self::Estimated => "optimal for an estimate, a measurement is missing",
+            Self::PreviousPlan => "the previous plan is executed further",
+            Self::SafeStop => "safe stop, steering held",
+        })
+    }
+}
+
 impl Status {
-    /// The status of a solved problem.
-    pub(crate) fn of(outcome: Outcome) -> Self {
+    /// The status of a plan, made from a `complete` measurement or from an estimate.
+    pub(crate) fn of(outcome: Outcome, complete: bool) -> Self {
         match outcome {
+            Outcome::Optimal | Outcome::InteriorPoint if !complete => Self::Estimated,
             Outcome::Optimal => Self::Optimal,
             Outcome::InteriorPoint => Self::InteriorPoint,
             _ => Self::PreviousPlan,

@@ -72,17 +72,24 @@ impl Latency {
     }
 
     /// Moves the actuators on to time `t` [s] and forgets commands that no longer matter.
-    pub fn advance(&mut self, t: f64) {
+    ///
+    /// Returns how long that was [s] and what the actuators delivered in the mean.
+    pub fn advance(&mut self, t: f64) -> (f64, Input) {
+        let duration = t - self.time;
+        let mut sum = Input::zeros();
         let mut now = self.time;
         while now < t - SAME_TIME {
             let (command, until) = self.acting(now);
             let next = until.min(t);
+            sum += lag_integral(&self.actual, &command, next - now, &self.tau);
             self.actual = lag(&self.actual, &command, next - now, &self.tau);
             now = next;
         }
         self.time = t;
         let acting = self.commands.iter().rposition(|(acts, _)| *acts <= t + SAME_TIME);
         self.commands.drain(..acting.unwrap_or(0));
+        let mean = if now > t - duration { sum / duration } else { self.actual };
+        (duration, mean)
     }
 
     /// The command that acts at time `t` [s] and the time at which the next one takes over [s].
@@ -95,7 +102,7 @@ impl Latency {
         (command, self.commands.get(next).map_or(f64::INFINITY, |(acts, _)| *acts))
     }
 
-    /// Moves the state `x`, measured at the time of the last [`advance`](Self::advance), on by `step` [s] and the delay.
+    /// Moves the state `x` at the time of the last [`advance`](Self::advance) on by `step` [s] and the delay.
     ///
     /// `kappa` gives the curvature [1/m] at a time after the measurement [s].
     pub fn predict(
@@ -151,6 +158,14 @@ impl Latency {
     }
 }
 
+/// What first-order lags deliver in the sum over `h` [s] [rad s, m/s].
+fn lag_integral(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Input {
+    Input::from_fn(|j, _| {
+        let distance = if tau[j] > 0.0 { (actual[j] - command[j]) * -(-h / tau[j]).exp_m1() * tau[j] } else { 0.0 };
+        command[j] * h + distance
+    })
+}
+
 /// First-order lags over `h` [s], exact for a held command.
 fn lag(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Input {
     let follow = |j: usize| {
@@ -204,6 +219,20 @@ mod tests {
         let rest = later.predict(&half.x, 0.0, |_| 0.01, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
         assert!((rest.x - whole.x).norm() < 1e-12, "{} {}", rest.x, whole.x);
         assert!((rest.actual - whole.actual).norm() < 1e-12);
+    }
+
+    #[test]
+    fn mean_delivery_is_the_integral_of_the_lag() {
+        let mut latency = Latency::new(0.0, 0.0, [0.1, 0.0], 0.033);
+        latency.send(0.01, Input::from([0.05, 2.0]));
+        let (duration, mean) = latency.advance(0.04);
+        assert_eq!(duration, 0.04);
+        // Nothing for 10 ms, then the response of the lag, by the trapezoidal rule on 3000 pieces.
+        let response = |t: f64| 0.05 * (1.0 - (-t / 0.1).exp());
+        let sum: f64 =
+            (0..3000).map(|k| 0.5e-5 * (response(f64::from(k) * 1e-5) + response(f64::from(k + 1) * 1e-5))).sum();
+        assert!((mean[0] - sum / 0.04).abs() < 1e-10, "{mean}");
+        assert!((mean[1] - 2.0 * 0.75).abs() < 1e-12, "{mean}");
     }
 
     #[test]

@@ -21,6 +21,7 @@
 pub mod controller;
 pub mod discretise;
 mod error;
+pub mod estimator;
 mod ladder;
 pub mod latency;
 pub mod model;
@@ -33,5 +34,5 @@ pub mod signals;
 pub use controller::Controller;
 pub use error::Error;
 pub use ladder::Status;
-pub use parameters::{Adaptation, Backend, Parameters};
+pub use parameters::{Adaptation, Backend, Estimation, Parameters};
 pub use signals::{Inputs, Output};

@@ -20,6 +20,17 @@ pub enum Adaptation {
     Constant,
 }
 
+/// Where the state that the plan starts from comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimation {
+    /// The measurement as it is, as in the paper.
+    Measured,
+    /// A Kalman filter, which also estimates the accelerations that the model cannot explain.
+    #[default]
+    Kalman,
+}
+
 /// Which solver answers first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -101,6 +112,13 @@ pub struct Parameters {
     pub tau_delta: f64,
     /// Time constant of the drive and brake actuator [s].
     pub tau_a_x: f64,
+    /// Where the state that the plan starts from comes from.
+    pub estimation: Estimation,
+    /// Standard deviations of the sensors that the filter assumes, in units of 0.03 m/s on both velocities, 0.002 rad/s,
+    /// 0.01 m and 0.002 rad [1].
+    pub sensor_noise: f64,
+    /// Whether the lateral velocity is measured; if not, it is estimated.
+    pub v_y_measured: bool,
 }
 
 impl Default for Parameters {
@@ -146,6 +164,9 @@ impl Default for Parameters {
             input_delay: 0.0,
             tau_delta: 0.0,
             tau_a_x: 0.0,
+            estimation: Estimation::Kalman,
+            sensor_noise: 1.0,
+            v_y_measured: true,
         }
     }
 }
@@ -193,6 +214,7 @@ impl Parameters {
             ("a_x_max", self.a_x_max),
             ("a_x_rate_max", self.a_x_rate_max),
             ("e_y_max", self.e_y_max),
+            ("sensor_noise", self.sensor_noise),
         ] {
             check(name, value, positive(value), "positive and finite")?;
         }
@@ -274,8 +296,11 @@ mod tests {
         }
         let is_real = reals!(m i_z l_f l_r c_d area rho c_rr g c_f_nominal c_r_nominal t_s q_v_x q_v_y q_yaw_rate q_e_y
             q_e_psi r_delta r_a_x terminal_factor delta_max delta_rate_max a_x_min a_x_max a_x_rate_max e_y_max
-            e_y_penalty input_delay tau_delta tau_a_x);
-        assert!(is_real || ["horizon", "adaptation", "backend"].contains(&name), "{name} is not covered");
+            e_y_penalty input_delay tau_delta tau_a_x sensor_noise);
+        assert!(
+            is_real || ["horizon", "adaptation", "backend", "estimation", "v_y_measured"].contains(&name),
+            "{name} is not covered"
+        );
         is_real
     }
 }

@@ -50,7 +50,7 @@ impl Default for Inputs {
 
 impl Inputs {
     /// The measured state.
-    pub(crate) fn state(&self) -> State {
+    pub fn state(&self) -> State {
         let mut x = State::zeros();
         x[V_X] = self.v_x;
         x[V_Y] = self.v_y;

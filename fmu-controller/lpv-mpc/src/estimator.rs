@@ -1,0 +1,160 @@
+//! State and disturbance from noisy measurements: an extended Kalman filter on the prediction model.
+//!
+//! The vehicle states are augmented by three accelerations that the model cannot explain, on `v_x`, `v_y` and `yaw_rate`,
+//! each a random walk: wind, grade, bank, a steering offset and tyres that differ from the nominal ones all show there. The
+//! plan takes the estimate as constant along the horizon, which makes the tracking offset-free. Measurements enter one by
+//! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on.
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::discretise::{Hold, discretise};
+use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
+
+/// States and disturbances.
+const NZ: usize = NX + 3;
+
+/// Standard deviations of the sensors: one unit of the plant's noise in the public interface [m/s, m/s, rad/s, m, rad].
+pub const SENSOR_DEVIATION: [f64; NX] = [0.03, 0.03, 0.002, 0.01, 0.002];
+
+/// Intensities of the random walks of the disturbances [m/s2, m/s2, rad/s2 per root second].
+///
+/// A gust of the general track changes the drag by about 1 m/s2 within a second; the mismatch between a constant stiffness
+/// and a tyre at 80 % of its grip changes the lateral acceleration by 2 to 3 m/s2 and the yaw acceleration by about as much
+/// within a lane change of one second.
+const WALK: [f64; 3] = [1.0, 3.0, 3.0];
+
+/// Intensities of what is wrong with the model's states themselves [unit per root second]: the rounding of the schedule and
+/// of the preview, a tenth of a sensor's deviation a second.
+const MODEL: [f64; NX] = [0.003, 0.003, 0.0002, 0.001, 0.0002];
+
+/// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind.
+const INITIAL: [f64; 3] = [1.0, 1.0, 0.5];
+
+/// Extended Kalman filter of the vehicle states and the unexplained accelerations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimator {
+    /// Estimated state.
+    pub x: State,
+    /// Estimated disturbance.
+    pub disturbance: Disturbance,
+    P: SMatrix<f64, NZ, NZ>,
+    /// Curvature at the last update [1/m].
+    kappa: f64,
+    /// Whether a measurement has been seen to start from.
+    started: bool,
+    /// Standard deviations of the sensors in units of [`SENSOR_DEVIATION`].
+    sensor_noise: f64,
+}
+
+impl Estimator {
+    /// Nothing known yet; `sensor_noise` is in units of [`SENSOR_DEVIATION`].
+    pub fn new(sensor_noise: f64) -> Self {
+        Self {
+            x: State::zeros(),
+            disturbance: Disturbance::zeros(),
+            P: SMatrix::zeros(),
+            kappa: 0.0,
+            started: false,
+            sensor_noise,
+        }
+    }
+
+    /// Moves the estimate on by `duration` [s] under the mean `input`, then corrects it by the measurement.
+    ///
+    /// `measured` may hold NaN where nothing was measured, `kappa` is the curvature at the measurement [1/m]. Returns whether
+    /// every value was used.
+    pub fn update(
+        &mut self,
+        measured: &State,
+        kappa: f64,
+        input: &Input,
+        duration: f64,
+        body: &Body,
+        tyres: &Tyres,
+    ) -> bool {
+        let complete = measured.iter().all(|z| z.is_finite());
+        let kappa = if kappa.is_finite() { kappa } else { self.kappa };
+        if !self.started {
+            self.start(measured);
+        } else if duration > 0.0 {
+            self.predict(0.5 * (self.kappa + kappa), input, duration, body, tyres);
+        }
+        self.kappa = kappa;
+        for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.is_finite()) {
+            self.correct(i, *z);
+        }
+        complete
+    }
+
+    /// Whether there is an estimate at all.
+    pub fn is_started(&self) -> bool {
+        self.started
+    }
+
+    /// Takes the first measurement as it is; a lateral velocity that is not measured starts at zero.
+    fn start(&mut self, measured: &State) {
+        let known = [V_X, YAW_RATE, E_Y, E_PSI].iter().all(|i| measured[*i].is_finite());
+        if !known {
+            return;
+        }
+        self.started = true;
+        self.x = measured.map(|z| if z.is_finite() { z } else { 0.0 });
+        let mut deviation = SVector::<f64, NZ>::zeros();
+        for i in 0..NX {
+            deviation[i] = if measured[i].is_finite() { self.deviation(i) } else { 1.0 };
+        }
+        deviation.fixed_rows_mut::<3>(NX).copy_from(&SVector::from(INITIAL));
+        self.P = SMatrix::from_diagonal(&deviation.component_mul(&deviation));
+    }
+
+    fn deviation(&self, i: usize) -> f64 {
+        SENSOR_DEVIATION[i] * self.sensor_noise
+    }
+
+    fn predict(&mut self, kappa: f64, input: &Input, duration: f64, body: &Body, tyres: &Tyres) {
+        let hold = Hold::new(duration, [0.0, 0.0]);
+        let sample = |x: &State| discretise(&embed(x, input, kappa, body, tyres, &self.disturbance), &hold);
+        let move_on = |x: &State| {
+            let at = sample(x);
+            (at.Phi * self.x + at.Gamma * input + at.d, at)
+        };
+        // Scheduled in the middle of the step, as the stages of the plan are.
+        let (end, _) = move_on(&self.x);
+        let (x, at) = move_on(&((self.x + end) * 0.5));
+
+        let mut F = SMatrix::<f64, NZ, NZ>::identity();
+        F.fixed_view_mut::<NX, NX>(0, 0).copy_from(&at.Phi);
+        for j in [V_X, V_Y, YAW_RATE] {
+            // What an acceleration held over the step does, to first order: the walk is far from being known better.
+            F[(j, NX + j)] = duration;
+        }
+        F[(E_Y, NX + V_Y)] = 0.5 * duration * duration;
+        F[(E_PSI, NX + YAW_RATE)] = 0.5 * duration * duration;
+        self.P = F * self.P * F.transpose();
+        for i in 0..NX {
+            self.P[(i, i)] += MODEL[i] * MODEL[i] * duration;
+        }
+        for j in 0..3 {
+            self.P[(NX + j, NX + j)] += WALK[j] * WALK[j] * duration;
+        }
+        self.x = x;
+    }
+
+    /// One measured state; the covariance stays symmetric because its column and row are the same numbers.
+    fn correct(&mut self, i: usize, z: f64) {
+        if !self.started {
+            return;
+        }
+        let column = self.P.column(i).into_owned();
+        let gain = column / (column[i] + self.deviation(i) * self.deviation(i));
+        let innovation = z - self.x[i];
+        for k in 0..NX {
+            self.x[k] += gain[k] * innovation;
+        }
+        for k in 0..3 {
+            self.disturbance[k] += gain[NX + k] * innovation;
+        }
+        self.P -= gain * column.transpose();
+    }
+}

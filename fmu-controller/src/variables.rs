@@ -1,0 +1,135 @@
+//! Every variable of the controller, once.
+
+use lpv_mpc::parameters::HORIZON_MAX;
+use lpv_mpc::preview::PREVIEW;
+use lpv_mpc::{Adaptation, Backend, Status};
+use model_description::{Enumeration, Item, Table, variables};
+
+use crate::LpvMpcController;
+
+const STATUS: Enumeration = Enumeration {
+    name: "Status",
+    description: "How good the present command is, in growing severity",
+    items: &[
+        Item { value: Status::Optimal as i32, name: "optimal", description: "The plan is optimal to rounding" },
+        Item {
+            value: Status::InteriorPoint as i32,
+            name: "interior_point",
+            description: "The plan is optimal to the tolerance of an interior point method",
+        },
+        Item {
+            value: Status::PreviousPlan as i32,
+            name: "previous_plan",
+            description: "No new plan, because of unusable inputs or a failed solve; the previous plan is executed further",
+        },
+        Item {
+            value: Status::SafeStop as i32,
+            name: "safe_stop",
+            description: "Nothing of the previous plan is left: steering is held, the car brakes at its rate limit",
+        },
+    ],
+};
+
+const ADAPTATION: Enumeration = Enumeration {
+    name: "Adaptation",
+    description: "Where the cornering stiffnesses of the prediction model come from",
+    items: &[Item {
+        value: Adaptation::Constant as i32,
+        name: "constant",
+        description: "c_f_nominal and c_r_nominal, always",
+    }],
+};
+
+const BACKEND: Enumeration = Enumeration {
+    name: "Backend",
+    description: "Which solver of the quadratic programme answers first",
+    items: &[
+        Item {
+            value: Backend::Structured as i32,
+            name: "structured",
+            description: "Active set and interior point on the Riccati recursion",
+        },
+        Item {
+            value: Backend::Clarabel as i32,
+            name: "clarabel",
+            description: "A general conic solver, slower by two orders of magnitude",
+        },
+    ],
+};
+
+/// Value references are rows: append, never reorder.
+pub fn table() -> &'static Table<LpvMpcController> {
+    variables! { LpvMpcController;
+        Input v_x ["m/s"] "Longitudinal velocity, body frame" => inputs.v_x;
+        Input v_y ["m/s"] "Lateral velocity of the centre of gravity, positive to the left" => inputs.v_y;
+        Input yaw_rate ["rad/s"] "Yaw rate, positive to the left" => inputs.yaw_rate;
+        Input e_y ["m"] "Lateral position relative to the path, positive to the left" => inputs.e_y;
+        Input e_psi ["rad"] "Vehicle heading minus path heading" => inputs.e_psi;
+        Input kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and at the next 40 sample times, positive to the left" => inputs.kappa_ref;
+        Input v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times" => inputs.v_x_ref;
+
+        Output delta ["rad"] "Front steering angle command" => { get |m| m.controller.output().delta };
+        Output a_x ["m/s2"] "Longitudinal acceleration command" => { get |m| m.controller.output().a_x };
+        Output c_f ["N/rad"] "Front cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_f };
+        Output c_r ["N/rad"] "Rear cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_r };
+        Output status "How good the present command is", items &STATUS => { get |m| m.controller.output().status as i32 };
+        Output iterations "Iterations of the solver in the last sample" => { get |m| m.controller.output().iterations };
+        Output kkt_residual ["1"] "Scaled residual of the conditions of optimality" => { get |m| m.controller.output().kkt_residual };
+        Output slack_e_y ["m"] "Largest predicted excess over e_y_max" => { get |m| m.controller.output().slack_e_y };
+        Output solve_time ["s"] "Wall clock of the last sample, the only value that is not reproducible" => { get |m| m.solve_time };
+        Output e_y_pred [HORIZON_MAX] ["m"] "Predicted lateral error, one element per period; beyond the horizon the last value" => { get |m, k| m.controller.output().e_y_pred[k] };
+        Output e_psi_pred [HORIZON_MAX] ["rad"] "Predicted heading error" => { get |m, k| m.controller.output().e_psi_pred[k] };
+        Output v_x_pred [HORIZON_MAX] ["m/s"] "Predicted longitudinal velocity" => { get |m, k| m.controller.output().v_x_pred[k] };
+        Output v_y_pred [HORIZON_MAX] ["m/s"] "Predicted lateral velocity" => { get |m, k| m.controller.output().v_y_pred[k] };
+        Output yaw_rate_pred [HORIZON_MAX] ["rad/s"] "Predicted yaw rate" => { get |m, k| m.controller.output().yaw_rate_pred[k] };
+        Output delta_pred [HORIZON_MAX] ["rad"] "Planned steering angle commands" => { get |m, k| m.controller.output().delta_pred[k] };
+        Output a_x_pred [HORIZON_MAX] ["m/s2"] "Planned acceleration commands" => { get |m, k| m.controller.output().a_x_pred[k] };
+
+        Parameter m ["kg"] "Mass", min 1.0, max 1e5 => parameters.m;
+        Parameter i_z ["kg m2"] "Yaw inertia", min 1.0, max 1e6 => parameters.i_z;
+        Parameter l_f ["m"] "Distance from the centre of gravity to the front axle", min 0.01, max 20.0 => parameters.l_f;
+        Parameter l_r ["m"] "Distance from the centre of gravity to the rear axle", min 0.01, max 20.0 => parameters.l_r;
+        Parameter c_d ["1"] "Drag coefficient", min 0.0, max 5.0 => parameters.c_d;
+        Parameter area ["m2"] "Frontal area", min 0.0, max 50.0 => parameters.area;
+        Parameter rho ["kg/m3"] "Air density", min 0.0, max 5.0 => parameters.rho;
+        Parameter c_rr ["1"] "Rolling resistance coefficient", min 0.0, max 1.0 => parameters.c_rr;
+        Parameter g ["m/s2"] "Gravitational acceleration", min 0.1, max 100.0 => parameters.g;
+        Parameter c_f_nominal ["N/rad"] "Nominal cornering stiffness of the front axle", min 100.0, max 1e7 => parameters.c_f_nominal;
+        Parameter c_r_nominal ["N/rad"] "Nominal cornering stiffness of the rear axle", min 100.0, max 1e7 => parameters.c_r_nominal;
+        Parameter t_s ["s"] "Controller period", min 1e-3, max 0.2 => parameters.t_s;
+        Parameter horizon "Prediction horizon in periods; about 1 s is what the limit of grip needs", min 1.0, max 40.0 => parameters.horizon;
+        Tunable q_v_x ["s2/m2"] "Weight on the speed error", min 0.0, max 1e12 => parameters.q_v_x;
+        Tunable q_v_y ["s2/m2"] "Weight on the lateral velocity error", min 0.0, max 1e12 => parameters.q_v_y;
+        Tunable q_yaw_rate ["s2/rad2"] "Weight on the yaw rate error", min 0.0, max 1e12 => parameters.q_yaw_rate;
+        Tunable q_e_y ["1/m2"] "Weight on the lateral error", min 0.0, max 1e12 => parameters.q_e_y;
+        Tunable q_e_psi ["1/rad2"] "Weight on the heading error", min 0.0, max 1e12 => parameters.q_e_psi;
+        Tunable r_delta ["1/rad2"] "Weight on the steering increment per period", min 1e-12, max 1e12 => parameters.r_delta;
+        Tunable r_a_x ["s4/m2"] "Weight on the acceleration increment per period", min 1e-12, max 1e12 => parameters.r_a_x;
+        Tunable terminal_factor ["1"] "Factor of the stage weights in the terminal cost", min 0.0, max 1e6 => parameters.terminal_factor;
+        Tunable delta_max ["rad"] "Largest steering angle", min 1e-3, max 1.5 => parameters.delta_max;
+        Tunable delta_rate_max ["rad/s"] "Largest steering rate", min 1e-3, max 100.0 => parameters.delta_rate_max;
+        Tunable a_x_min ["m/s2"] "Strongest braking, negative", min -50.0, max -0.01 => parameters.a_x_min;
+        Tunable a_x_max ["m/s2"] "Strongest acceleration", min 0.01, max 50.0 => parameters.a_x_max;
+        Tunable a_x_rate_max ["m/s3"] "Largest rate of the acceleration", min 0.01, max 1e4 => parameters.a_x_rate_max;
+        Tunable e_y_max ["m"] "Lateral error beyond which the soft constraint costs", min 1e-3, max 100.0 => parameters.e_y_max;
+        Tunable e_y_penalty ["1/m2"] "Penalty on the squared excess over e_y_max", min 0.0, max 1e12 => parameters.e_y_penalty;
+        Parameter adaptation "Where the cornering stiffnesses of the prediction model come from", items &ADAPTATION
+            => { get |m| m.parameters.adaptation as i32, set |m, v: i32| m.parameters.adaptation = adaptation(v) };
+        Parameter backend "Which solver of the quadratic programme answers first", items &BACKEND
+            => { get |m| m.parameters.backend as i32, set |m, v: i32| m.parameters.backend = backend(v) };
+        Parameter input_delay ["s"] "Latency of the actuators beyond the communication step", min 0.0, max 1.0 => parameters.input_delay;
+        Parameter tau_delta ["s"] "Time constant of the steering actuator; 0: none", min 0.0, max 10.0 => parameters.tau_delta;
+        Parameter tau_a_x ["s"] "Time constant of the drive and brake actuator; 0: none", min 0.0, max 10.0 => parameters.tau_a_x;
+        Parameter hold_preview "Whether only element 1 of each preview is given and holds for the others" => inputs.hold_preview;
+    }
+}
+
+/// The table lets only values of the enumeration through.
+fn adaptation(_value: i32) -> Adaptation {
+    Adaptation::Constant
+}
+
+/// The table lets only values of the enumeration through.
+fn backend(value: i32) -> Backend {
+    if value == Backend::Clarabel as i32 { Backend::Clarabel } else { Backend::Structured }
+}
