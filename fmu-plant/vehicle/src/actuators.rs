@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// Times closer than this are the same time: rounding of summed steps, far below any effect on the motion [s].
 const SAME_TIME: f64 = 1e-10;
 
-/// Changes of the command that a delay remembers: 1 s of them at a communication step of 0.25 ms. Denser changes push
-/// the oldest out, which then end early.
+/// Changes of the command that a delay remembers: 1 s of them at a communication step of 0.25 ms. Of denser
+/// changes the oldest but one is forgotten, and the one before it holds on.
 const CAPACITY: usize = 4096;
 
 /// Constants of one actuator.
@@ -124,7 +124,7 @@ impl State {
             return;
         }
         if self.history.len() == CAPACITY {
-            self.history.pop_front();
+            self.history.remove(1);
         }
         self.history.push_back((time, command));
     }

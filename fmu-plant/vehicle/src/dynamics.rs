@@ -193,6 +193,13 @@ fn progress<D: Scalar>(e_y_kappa: D) -> D {
     if e_y_kappa.re() > 1.0 - NEAREST { D::from(NEAREST) } else { -e_y_kappa + 1.0 }
 }
 
+/// Rate of the arc length [m/s] at these velocities, errors and curvature.
+#[must_use]
+pub fn progress_rate((v_x, v_y): (f64, f64), (e_y, e_psi): (f64, f64), kappa: f64) -> f64 {
+    let (sin, cos) = e_psi.sin_cos();
+    (v_x * cos - v_y * sin) / progress(e_y * kappa)
+}
+
 /// Rolling resistance over its value at speed: 1 from 0.5 m/s on, and a smooth odd cubic through standstill below.
 #[inline]
 fn rolling<D: Scalar>(v_x: D) -> D {

@@ -24,7 +24,7 @@ pub struct State {
     pub steering: actuators::State,
     /// The drive and the brakes.
     pub drive: actuators::State,
-    /// The inputs of the last step.
+    /// The inputs at the end of the last step.
     pub inputs: Inputs,
     /// The noise that is held at present.
     noise: Measurement,
@@ -138,23 +138,26 @@ impl Vehicle {
         &self.state
     }
 
-    /// Moves on by `h` seconds; the inputs hold, or follow their rates.
-    ///
-    /// After an error the vehicle is where it was before the step.
+    /// Moves on by `h` seconds while the inputs hold.
     pub fn advance(&mut self, h: f64, inputs: &Inputs) -> Result<(), Error> {
+        self.advance_along(h, inputs, &Inputs::ZERO)
+    }
+
+    /// Moves on by `h` seconds while the inputs change at `rates`.
+    ///
+    /// After an error the motion is where it was before the step.
+    pub fn advance_along(&mut self, h: f64, inputs: &Inputs, rates: &Inputs) -> Result<(), Error> {
         if !(h > 0.0 && h <= STEP_MAX) {
             return Err(Error::Step(h));
         }
         inputs.validate()?;
         let before = (self.state.x, self.state.time, self.state.steering.position, self.state.drive.position);
-        self.state.inputs = *inputs;
         let start = self.state.time;
-        let delta = |t: f64| Ramp { value: inputs.delta + inputs.delta_rate * t, slope: inputs.delta_rate };
-        let a_x = |t: f64| Ramp { value: inputs.a_x + inputs.a_x_rate * t, slope: inputs.a_x_rate };
+        let delta = |t: f64| Ramp { value: inputs.delta + rates.delta * t, slope: rates.delta };
+        let a_x = |t: f64| Ramp { value: inputs.a_x + rates.a_x * t, slope: rates.a_x };
         self.state.steering.command(&self.derived.steering, start, delta(0.0));
         self.state.drive.command(&self.derived.drive, start, a_x(0.0));
 
-        let wind = wind(inputs.wind_speed, inputs.wind_direction);
         let mut done = 0.0;
         while done < h {
             let (now, left) = (start + done, h - done);
@@ -163,7 +166,7 @@ impl Vehicle {
             let (push, until) = drive.piece(&self.derived.drive, now, a_x(done), until);
             // The last piece ends exactly with the step, and every piece moves time on.
             let length = if left - until <= 1e-12 { left } else { until };
-            self.integrate(length, &steer, &push, wind, inputs.mu_scale);
+            self.integrate(length, (&steer, &push), &inputs.after(done, rates), rates);
             self.state.steering.position = steer.at(length);
             self.state.drive.position = push.at(length);
             done = if length == left { h } else { done + length };
@@ -174,17 +177,21 @@ impl Vehicle {
             (self.state.x, self.state.time, self.state.steering.position, self.state.drive.position) = before;
             return Err(error);
         }
+        self.state.inputs = inputs.after(h, rates);
         self.draw_noise();
         Ok(())
     }
 
     /// Integrates over one piece of both actuators.
-    fn integrate(&mut self, length: f64, steer: &Piece, push: &Piece, wind: [f64; 2], mu_scale: f64) {
+    fn integrate(&mut self, length: f64, (steer, push): (&Piece, &Piece), inputs: &Inputs, rates: &Inputs) {
         let Self { derived: Derived { dynamics, .. }, road, state, .. } = self;
         let n = integrate::count(length);
         let h = length / f64::from(n);
-        let still = steer.is_constant() && push.is_constant();
-        let at = |t: f64| drive((steer.at(t), push.at(t)), wind, mu_scale);
+        let still = steer.is_constant() && push.is_constant() && *rates == Inputs::ZERO;
+        let at = |t: f64| {
+            let Inputs { wind_speed, wind_direction, mu_scale, .. } = inputs.after(t, rates);
+            drive((steer.at(t), push.at(t)), wind(wind_speed, wind_direction), mu_scale)
+        };
         let mut drives = [at(0.0); 3];
         for i in 0..n {
             if !still {
@@ -226,6 +233,14 @@ impl Vehicle {
         self.road.preview(self.state.x[S], self.parameters.preview_step)
     }
 
+    /// Time derivative of the preview.
+    #[must_use]
+    pub fn preview_rate(&self) -> Preview {
+        let [v_x, v_y, _, s, e_y, e_psi, ..] = self.state.x;
+        let s_dot = dynamics::progress_rate((v_x, v_y), (e_y, e_psi), self.road.curvature(s));
+        self.road.preview_rate(s, s_dot, self.parameters.preview_step)
+    }
+
     /// Everything else that the plant shows, under the inputs of the last step.
     #[must_use]
     pub fn outputs(&self) -> Outputs {
@@ -240,8 +255,7 @@ impl Vehicle {
         self.signals(&self.state.x, (steer.at(0.0), push.at(0.0)), wind, inputs.mu_scale)
     }
 
-    /// How the outputs change with the inputs along the direction `seed` (its rates are ignored), exactly, by dual
-    /// numbers. A command moves its actuator at once only if that has neither delay nor lag nor rate limit.
+    /// How the outputs change with the inputs along the direction `seed`, exactly, by dual numbers. A command moves its actuator at once only if that has neither delay nor lag nor rate limit.
     #[must_use]
     pub fn outputs_along(&self, inputs: &Inputs, seed: &Inputs) -> Outputs {
         let (steer, push) = self.pieces(inputs);
@@ -271,8 +285,8 @@ impl Vehicle {
     /// How both actuators move from now on under `inputs`.
     fn pieces(&self, inputs: &Inputs) -> (Piece, Piece) {
         let Self { state: State { steering, drive, time, .. }, derived, .. } = self;
-        let delta = Ramp { value: inputs.delta, slope: inputs.delta_rate };
-        let a_x = Ramp { value: inputs.a_x, slope: inputs.a_x_rate };
+        let delta = Ramp { value: inputs.delta, slope: 0.0 };
+        let a_x = Ramp { value: inputs.a_x, slope: 0.0 };
         (
             steering.piece(&derived.steering, *time, delta, STEP_MAX).0,
             drive.piece(&derived.drive, *time, a_x, STEP_MAX).0,

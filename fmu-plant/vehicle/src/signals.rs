@@ -21,23 +21,11 @@ pub struct Inputs {
     pub wind_direction: f64,
     /// Factor on the friction [1].
     pub mu_scale: f64,
-    /// Rate of the steering command inside the step [rad/s].
-    pub delta_rate: f64,
-    /// Rate of the acceleration command inside the step [m/s3].
-    pub a_x_rate: f64,
 }
 
 impl Default for Inputs {
     fn default() -> Self {
-        Self {
-            delta: 0.0,
-            a_x: 0.0,
-            wind_speed: 0.0,
-            wind_direction: 0.0,
-            mu_scale: 1.0,
-            delta_rate: 0.0,
-            a_x_rate: 0.0,
-        }
+        Self { mu_scale: 1.0, ..Self::ZERO }
     }
 }
 
@@ -61,6 +49,23 @@ macro_rules! ranges {
     };
 }
 
+impl Inputs {
+    /// No change of any input.
+    pub const ZERO: Self = Self { delta: 0.0, a_x: 0.0, wind_speed: 0.0, wind_direction: 0.0, mu_scale: 0.0 };
+
+    /// These inputs after `t` seconds of changing at `rates`; friction stays inside its range.
+    #[must_use]
+    pub fn after(&self, t: f64, rates: &Self) -> Self {
+        Self {
+            delta: self.delta + t * rates.delta,
+            a_x: self.a_x + t * rates.a_x,
+            wind_speed: self.wind_speed + t * rates.wind_speed,
+            wind_direction: self.wind_direction + t * rates.wind_direction,
+            mu_scale: (self.mu_scale + t * rates.mu_scale).clamp(Self::MIN.mu_scale, Self::MAX.mu_scale),
+        }
+    }
+}
+
 // Commands may exceed what the actuators reach: those saturate.
 impl Inputs {
     ranges! {
@@ -69,8 +74,6 @@ impl Inputs {
         wind_speed -100.0, 100.0;
         wind_direction -100.0, 100.0;
         mu_scale 0.0, 2.0;
-        delta_rate -1e4, 1e4;
-        a_x_rate -1e5, 1e5;
     }
 }
 

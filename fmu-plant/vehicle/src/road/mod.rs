@@ -9,6 +9,7 @@ mod schedule;
 use std::sync::Arc;
 
 use nalgebra::SVector;
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 pub use profile::Profile;
@@ -176,15 +177,34 @@ impl Road {
     #[must_use]
     pub fn preview(&self, s: f64, step: f64) -> Preview {
         let mut preview = Preview::default();
-        let now = self.schedule.time(s);
-        let mut ahead = s;
-        let mut after = 0.0;
-        for j in 0..PREVIEW {
+        self.look_ahead(s, step, |j, ahead| {
             preview.kappa_ref[j] = self.curvature(ahead);
             preview.v_x_ref[j] = self.speed(ahead);
-            after += step;
-            ahead = self.schedule.place(now + after);
-        }
+        });
         preview
+    }
+
+    /// Time derivative of the preview while the arc length grows at `s_dot`.
+    #[must_use]
+    pub fn preview_rate(&self, s: f64, s_dot: f64, step: f64) -> Preview {
+        let mut rate = Preview::default();
+        let pace = s_dot / self.schedule.speed(s);
+        self.look_ahead(s, step, |j, ahead| {
+            // Every place of the reference's schedule moves at the speed there, times the pace of the whole.
+            let ahead = Dual64::new(ahead, pace * self.schedule.speed(ahead));
+            rate.kappa_ref[j] = self.curvature(ahead).eps;
+            rate.v_x_ref[j] = self.tables.v_x.at(ahead).eps;
+        });
+        rate
+    }
+
+    fn look_ahead(&self, s: f64, step: f64, mut each: impl FnMut(usize, f64)) {
+        let now = self.schedule.time(s);
+        each(0, s);
+        let mut after = 0.0;
+        for j in 1..PREVIEW {
+            after += step;
+            each(j, self.schedule.place(now + after));
+        }
     }
 }

@@ -15,6 +15,7 @@ pub struct Schedule {
     duration: f64,
     /// Speed held beyond the end [m/s].
     end_speed: f64,
+    speed: Profile,
     time: Profile,
     place: Profile,
 }
@@ -49,7 +50,13 @@ impl Schedule {
             t_done = t;
             (s, speed(s))
         });
-        Self { length, duration, end_speed: v_x.at(length), time, place }
+        Self { length, duration, end_speed: v_x.at(length), speed: v_x.clone(), time, place }
+    }
+
+    /// Speed of the reference at `s` [m/s]; never 0.
+    #[must_use]
+    pub fn speed(&self, s: f64) -> f64 {
+        self.speed.at(s).max(V_MIN)
     }
 
     /// Time at which the reference reaches the end [s].
