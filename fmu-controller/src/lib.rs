@@ -12,8 +12,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LpvMpcController {
     parameters: Parameters,
-    /// File of the network's weights; empty: the one in resources/.
-    network_file: String,
     inputs: Inputs,
     controller: Controller,
     /// Wall clock of the last step in which a sample was taken [s].
@@ -26,7 +24,6 @@ impl Default for LpvMpcController {
         Self {
             controller: Controller::new(parameters.clone(), 0.0).expect("a test shows that the defaults are valid"),
             parameters,
-            network_file: String::new(),
             inputs: Inputs::default(),
             solve_time: 0.0,
         }
@@ -76,8 +73,12 @@ impl Model for LpvMpcController {
         }
         match status {
             Status::Optimal | Status::InteriorPoint => Ok(Outcome::Ok),
-            Status::PreviousPlan | Status::SafeStop => {
-                Ok(Outcome::Degraded(format!("no plan at {} s, inputs {}: {status}", step.t, self.inputs.state())))
+            Status::Estimated | Status::PreviousPlan | Status::SafeStop => {
+                let Inputs { v_x, v_y, yaw_rate, e_y, e_psi, .. } = &self.inputs;
+                Ok(Outcome::Degraded(format!(
+                    "{status} at {} s (v_x {v_x}, v_y {v_y}, yaw_rate {yaw_rate}, e_y {e_y}, e_psi {e_psi})",
+                    step.t
+                )))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use lpv_mpc::parameters::HORIZON_MAX;
 use lpv_mpc::preview::PREVIEW;
-use lpv_mpc::{Adaptation, Backend, Status};
+use lpv_mpc::{Adaptation, Backend, Estimation, Status};
 use model_description::{Enumeration, Item, Table, variables};
 
 use crate::LpvMpcController;
@@ -16,6 +16,11 @@ const STATUS: Enumeration = Enumeration {
             value: Status::InteriorPoint as i32,
             name: "interior_point",
             description: "The plan is optimal to the tolerance of an interior point method",
+        },
+        Item {
+            value: Status::Estimated as i32,
+            name: "estimated",
+            description: "The plan is optimal, but a measurement was missing or not finite and its estimate was used",
         },
         Item {
             value: Status::PreviousPlan as i32,
@@ -53,6 +58,19 @@ const BACKEND: Enumeration = Enumeration {
             value: Backend::Clarabel as i32,
             name: "clarabel",
             description: "A general conic solver, slower by two orders of magnitude",
+        },
+    ],
+};
+
+const ESTIMATION: Enumeration = Enumeration {
+    name: "Estimation",
+    description: "Where the state that the plan starts from comes from",
+    items: &[
+        Item { value: Estimation::Measured as i32, name: "measured", description: "The measurement as it is" },
+        Item {
+            value: Estimation::Kalman as i32,
+            name: "kalman",
+            description: "A Kalman filter, which also estimates wind, grade and tyre mismatch as accelerations",
         },
     ],
 };
@@ -120,6 +138,10 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Parameter input_delay ["s"] "Latency of the actuators beyond the communication step", min 0.0, max 1.0 => parameters.input_delay;
         Parameter tau_delta ["s"] "Time constant of the steering actuator; 0: none", min 0.0, max 10.0 => parameters.tau_delta;
         Parameter tau_a_x ["s"] "Time constant of the drive and brake actuator; 0: none", min 0.0, max 10.0 => parameters.tau_a_x;
+        Parameter estimation "Where the state that the plan starts from comes from", items &ESTIMATION
+            => { get |m| m.parameters.estimation as i32, set |m, v: i32| m.parameters.estimation = estimation(v) };
+        Parameter sensor_noise ["1"] "Standard deviations that the filter assumes, in units of 0.03 m/s, 0.002 rad/s, 0.01 m and 0.002 rad", min 1e-3, max 1e3 => parameters.sensor_noise;
+        Parameter v_y_measured "Whether the lateral velocity is measured; if not, it is estimated" => parameters.v_y_measured;
         Parameter hold_preview "Whether only element 1 of each preview is given and holds for the others" => inputs.hold_preview;
     }
 }
@@ -132,4 +154,9 @@ fn adaptation(_value: i32) -> Adaptation {
 /// The table lets only values of the enumeration through.
 fn backend(value: i32) -> Backend {
     if value == Backend::Clarabel as i32 { Backend::Clarabel } else { Backend::Structured }
+}
+
+/// The table lets only values of the enumeration through.
+fn estimation(value: i32) -> Estimation {
+    if value == Estimation::Kalman as i32 { Estimation::Kalman } else { Estimation::Measured }
 }
