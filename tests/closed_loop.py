@@ -7,12 +7,10 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import (
     FMU2Slave,
-    allocateMemory,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
-    freeMemory,
 )
 
 RECORDED = {
@@ -38,8 +36,8 @@ class Unit:
         # Kept alive here: the library calls them later.
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(allocateMemory)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(freeMemory)
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
         self._slave.instantiate(callbacks=self._callbacks)
 
     def _log(self, _environment, _instance, _status, category, message):

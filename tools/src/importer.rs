@@ -240,11 +240,11 @@ impl Instance<'_> {
         Ok(())
     }
 
-    /// Initialises for a run that starts at 0 and ends at `stop` [s].
-    pub fn initialize(&mut self, stop: f64) -> Result<()> {
+    /// Initialises for a run that starts at 0 and has no set end.
+    pub fn initialize(&mut self) -> Result<()> {
         let functions = &self.fmu.functions;
         // SAFETY: [FMI, 4.2.4] the component is alive and in the state Instantiated.
-        let status = unsafe { (functions.setup_experiment)(self.component, 0, 0.0, 0.0, 1, stop) };
+        let status = unsafe { (functions.setup_experiment)(self.component, 0, 0.0, 0.0, 0, 0.0) };
         self.check("setupExperiment", status)?;
         // SAFETY: [FMI, 4.2.4] as above; the experiment is set up.
         let status = unsafe { (functions.enter_initialization)(self.component) };

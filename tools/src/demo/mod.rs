@@ -16,9 +16,6 @@ use crate::workspace::{archive_folder, shown};
 /// Communication steps of the demonstration: a fine one, and the controller's own period, which adds a whole sample of latency.
 const STEPS: [(&str, f64); 2] = [("1 ms steps", 0.001), ("33 ms steps", 0.033)];
 
-/// End given to the FMUs [s]; the run itself ends with the road.
-const STOP: f64 = 60.0;
-
 /// Shows the controller FMU driving the plant FMU through the double lane change.
 ///
 /// Builds and packs what is missing, prints the tracking errors beside the paper's and writes a page of plots.
@@ -61,8 +58,8 @@ pub fn drive(packed: &Packed, step: f64, settings: &[(&str, &str, &str)], output
             _ => controller.set(name, value)?,
         }
     }
-    plant.initialize(STOP)?;
-    controller.initialize(STOP)?;
+    plant.initialize()?;
+    controller.initialize()?;
     let progress = output.progress("driving");
     let recording = imported::drive(&mut plant, &mut controller, step, None, |t| {
         progress.set_message(format!("driving, {t:.1} s"));

@@ -28,7 +28,7 @@ pub fn build(models: &[Model]) -> Result<Vec<PathBuf>> {
     // Under `cargo run`, the variable names the very cargo that started this program.
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--message-format=json-render-diagnostics"]);
+    command.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
     for model in models {
         command.args(["--package", model.package]);
     }
