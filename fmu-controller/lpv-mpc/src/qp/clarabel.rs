@@ -12,7 +12,7 @@ use std::fmt;
 
 /// The quadratic programme through Clarabel's interior point method.
 ///
-/// Variables by stage: u_i, x_(i+1), e_(i+1). Rows: the dynamics of all stages, then by stage the upper and lower bounds of
+/// Variables by stage: u_i, x_(i+1) - x_ref, e_(i+1). Rows: the dynamics of all stages, then by stage the upper and lower bounds of
 /// u, of du, and of the soft state. A bound that is infinite and a soft bound that is off keep their row as 0 <= 1.
 pub struct Clarabel<const NX: usize, const NU: usize> {
     tolerance: f64,
@@ -115,7 +115,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
             // All three would tie the workspace to the values of its first problem.
             presolve_enable: false,
             input_sparse_dropzeros: false,
-            equilibrate_enable: true,
+            equilibrate_enable: false,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
             tol_feas: tolerance,
@@ -194,7 +194,7 @@ impl<const NX: usize, const NU: usize> Scaling<NX, NU> {
             // Beyond a factor of 1e3 from SI units the weight is noise to be left small, not a unit to be adopted.
             if weight > 0.0 { (1.0 / weight.sqrt()).clamp(1e-1, 1e1) } else { 1.0 }
         });
-        Self { x, u: SVector::from_fn(|j, _| optimality::span(problem, j)), cost: 1.0 }
+        Self { x, u: SVector::from_fn(|j, _| optimality::span(problem, j)), cost: 1e-2 }
     }
 }
 
@@ -286,18 +286,15 @@ impl Data {
         let N = problem.stages.len();
         let column = i * (NX + NU + 1) + NU;
         let Scaling { x: sx, cost, .. } = scaling;
-        let x_ref = &problem.stages[i].x_ref;
         if i + 1 < N {
-            let weight = 2.0 * problem.q[k] * sx[k] * cost;
-            self.P.push(column + k, weight * sx[k]);
-            self.q.push(-weight * x_ref[k]);
+            self.P.push(column + k, 2.0 * problem.q[k] * sx[k] * sx[k] * cost);
         } else {
-            let W = &problem.q_terminal;
             for l in 0..=k {
-                self.P.push(column + l, 2.0 * W[(l, k)] * sx[l] * sx[k] * cost);
+                let weight = 2.0 * problem.q_terminal[(l, k)] * cost;
+                self.P.push(column + l, weight * sx[l] * sx[k]);
             }
-            self.q.push(-2.0 * (0..NX).map(|l| W[(l, k)] * x_ref[l]).sum::<f64>() * sx[k] * cost);
         }
+        self.q.push(0.0);
         self.P.end_column();
 
         self.A.push(i * NX + k, 1.0);
@@ -342,24 +339,28 @@ impl Data {
         let u_prev = problem.u_prev_clamped();
         // An input that cannot move is taken out: it enters as a constant, and its own cost keeps its variable there.
         let fixed = SVector::<f64, NU>::from_fn(|j, _| unless(!is_fixed(problem, j), u_prev[j]));
-        for (i, stage) in problem.stages.iter().enumerate() {
-            let mut known = stage.d + stage.B * fixed;
-            if i == 0 {
-                known += stage.A * problem.x_0;
-            }
+        let mut before = problem.x_0;
+        for stage in &problem.stages {
+            let known = stage.A * before + stage.B * fixed + stage.d - stage.x_ref;
+            before = stage.x_ref;
             self.b.extend(known.component_div(&scaling.x).iter());
         }
         let bound = |j: usize, value: f64| {
             if is_fixed(problem, j) || value.is_infinite() { 1.0 } else { value / scaling.u[j] }
         };
-        let soft_bound = if has_soft_bound(problem) { problem.soft_bound / scaling.x[problem.soft_state] } else { 1.0 };
+        let k = problem.soft_state;
+        let soft_bound = |value: f64| {
+            if has_soft_bound(problem) { value / scaling.x[k] } else { 1.0 }
+        };
         for i in 0..problem.stages.len() {
             let before = if i == 0 { u_prev } else { SVector::zeros() };
             self.b.extend((0..NU).map(|j| bound(j, problem.u_max[j])));
             self.b.extend((0..NU).map(|j| bound(j, -problem.u_min[j])));
             self.b.extend((0..NU).map(|j| bound(j, problem.du_max[j] + before[j])));
             self.b.extend((0..NU).map(|j| bound(j, problem.du_max[j] - before[j])));
-            self.b.extend([soft_bound; 2]);
+            let x_ref = problem.stages[i].x_ref[k];
+            self.b.push(soft_bound(problem.soft_bound - x_ref));
+            self.b.push(soft_bound(problem.soft_bound + x_ref));
         }
     }
 }

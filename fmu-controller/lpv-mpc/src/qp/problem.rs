@@ -118,22 +118,30 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
             && self.soft_bound >= 0.0
     }
 
-    /// Cost of a plan; the soft bound's excess is counted with its weight.
+    /// Cost of a plan of states from now on and inputs; the soft bound's excess is counted with its weight.
     #[must_use]
     pub fn cost(&self, x: &[SVector<f64, NX>], u: &[SVector<f64, NU>]) -> f64 {
+        self.cost_of(x[1..].iter().copied().zip(u.iter().copied()))
+    }
+
+    /// Cost of a plan, sample by sample the input and the state that it leads to.
+    pub(super) fn cost_of(&self, plan: impl Iterator<Item = (SVector<f64, NX>, SVector<f64, NU>)>) -> f64 {
         let N = self.stages.len();
         let mut cost = 0.0;
         let mut u_prev = self.u_prev_clamped();
-        for i in 0..N {
-            let error = x[i + 1] - self.stages[i].x_ref;
+        for (i, ((x, u), stage)) in plan.zip(&self.stages).enumerate() {
+            let error = x - stage.x_ref;
             cost += if i + 1 == N {
                 error.dot(&(self.q_terminal * error))
             } else {
                 error.component_mul(&error).dot(&self.q)
             };
-            let du = u[i] - u_prev;
-            u_prev = u[i];
-            cost += du.component_mul(&du).dot(&self.r) + self.soft * self.excess(&x[i + 1]).powi(2);
+            let du = u - u_prev;
+            u_prev = u;
+            cost += du.component_mul(&du).dot(&self.r);
+            if self.soft > 0.0 {
+                cost += self.soft * self.excess(&x).powi(2);
+            }
         }
         cost
     }

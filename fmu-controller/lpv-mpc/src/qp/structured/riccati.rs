@@ -1,0 +1,310 @@
+//! One stage of the Riccati recursion over state and previous input.
+//!
+//! The value of a state x and the input p applied before it is
+//! `x' S x + 2 p' T' x + p' U p + 2 s' x + 2 t' p` up to a constant. Keeping the previous input as blocks of its own, instead of
+//! augmenting the state, saves the algebra of the rows that are known to be identities.
+
+use super::super::Stage;
+use super::active::Hold;
+
+/// Value function in front of a stage.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Value<const NX: usize, const NU: usize> {
+    pub S: [[f64; NX]; NX],
+    /// Row k is what state k shares with the inputs.
+    pub T: [[f64; NU]; NX],
+    pub U: [[f64; NU]; NU],
+    pub s: [f64; NX],
+    pub t: [f64; NU],
+}
+
+/// What a second right-hand side needs of a stage that was factorised.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Factor<const NX: usize, const NU: usize> {
+    /// Mixed curvature of input and state.
+    G: [[f64; NU]; NX],
+    /// Curvature of the input with its increment's weight.
+    H: [[f64; NU]; NU],
+    /// Inverse of the same with the rows of held inputs replaced.
+    inverse: [[f64; NU]; NU],
+    /// S d
+    Sd: [f64; NX],
+    /// T' d
+    Td: [f64; NU],
+}
+
+/// Optimal input of a stage, `u = K x + L p + k`, stored by columns.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Policy<const NX: usize, const NU: usize> {
+    pub K: [[f64; NU]; NX],
+    pub L: [[f64; NU]; NU],
+    pub k: [f64; NU],
+}
+
+impl<const NX: usize, const NU: usize> Value<NX, NU> {
+    pub(super) const ZERO: Self =
+        Self { S: [[0.0; NX]; NX], T: [[0.0; NU]; NX], U: [[0.0; NU]; NU], s: [0.0; NX], t: [0.0; NU] };
+
+    /// Adds `weight (x_k - target)^2`.
+    #[inline(always)]
+    pub(super) fn add_square(&mut self, k: usize, weight: f64, target: f64) {
+        self.S[k][k] += weight;
+        self.s[k] -= weight * target;
+    }
+}
+
+impl<const NX: usize, const NU: usize> Factor<NX, NU> {
+    pub(super) const ZERO: Self =
+        Self { G: [[0.0; NU]; NX], H: [[0.0; NU]; NU], inverse: [[0.0; NU]; NU], Sd: [0.0; NX], Td: [0.0; NU] };
+}
+
+impl<const NX: usize, const NU: usize> Policy<NX, NU> {
+    pub(super) const ZERO: Self = Self { K: [[0.0; NU]; NX], L: [[0.0; NU]; NU], k: [0.0; NU] };
+
+    /// The input for a state and a previous input.
+    #[inline(always)]
+    pub(super) fn input(&self, x: &[f64; NX], p: &[f64; NU]) -> [f64; NU] {
+        let mut u = self.k;
+        for j in 0..NU {
+            axpy(p[j], &self.L[j], &mut u);
+        }
+        for k in 0..NX {
+            axpy(x[k], &self.K[k], &mut u);
+        }
+        u
+    }
+}
+
+/// `y += a x`, the shape that the compiler turns into packed instructions.
+#[inline(always)]
+pub(super) fn axpy<const M: usize>(a: f64, x: &[f64; M], y: &mut [f64; M]) {
+    for m in 0..M {
+        y[m] += a * x[m];
+    }
+}
+
+#[inline(always)]
+fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C]) -> [[f64; C]; R] {
+    let mut rows = [[0.0; C]; R];
+    for c in 0..C {
+        for r in 0..R {
+            rows[r][c] = columns[c][r];
+        }
+    }
+    rows
+}
+
+/// Minimises over the input of a stage: from the value of what follows to the policy and the value in front.
+///
+/// An input that is held at a bound keeps the form of the policy: a constant, or the previous input plus a constant.
+/// Returns `None` when the curvature of a free input is not positive, which rounding can bring about.
+#[inline(always)]
+pub(super) fn step<const NX: usize, const NU: usize>(
+    stage: &Stage<NX, NU>,
+    after: &Value<NX, NU>,
+    r: &[f64; NU],
+    hold: &[Hold; NU],
+    policy: &mut Policy<NX, NU>,
+    before: &mut Value<NX, NU>,
+) -> Option<Factor<NX, NU>> {
+    let A = &stage.A.data.0;
+    let B = &stage.B.data.0;
+    let A_rows = transpose(A);
+    let B_rows = transpose(B);
+
+    // M = S B + T by rows.
+    let mut M = after.T;
+    let mut Sd = [0.0; NX];
+    let mut Td = [0.0; NU];
+    for k in 0..NX {
+        for l in 0..NX {
+            axpy(after.S[k][l], &B_rows[l], &mut M[k]);
+        }
+        axpy(stage.d[k], &after.S[k], &mut Sd);
+        axpy(stage.d[k], &after.T[k], &mut Td);
+    }
+    // G = M' A by columns, H = B' M + T' B + U + R.
+    let mut G = [[0.0; NU]; NX];
+    for c in 0..NX {
+        for k in 0..NX {
+            axpy(A[c][k], &M[k], &mut G[c]);
+        }
+    }
+    let mut H = after.U;
+    for k in 0..NX {
+        for j in 0..NU {
+            axpy(B[j][k], &M[k], &mut H[j]);
+            axpy(after.T[k][j], &B_rows[k], &mut H[j]);
+        }
+    }
+    for j in 0..NU {
+        H[j][j] += r[j];
+    }
+    let inverse = invert(&H, hold)?;
+    let factor = Factor { G, H, inverse, Sd, Td };
+    policy_gains(&factor, r, hold, policy);
+    linear_step(stage, &factor, r, hold, (&after.s, &after.t), policy, (&mut before.s, &mut before.t));
+
+    // S = A' S A + G' K, T = G' L: the terms of inputs that are free cancel to these by optimality.
+    let G_rows = transpose(&G);
+    for c in 0..NX {
+        let mut SA = [0.0; NX];
+        for k in 0..NX {
+            axpy(A[c][k], &after.S[k], &mut SA);
+        }
+        let mut column = [0.0; NX];
+        for k in 0..NX {
+            axpy(SA[k], &A_rows[k], &mut column);
+        }
+        for j in 0..NU {
+            axpy(policy.K[c][j], &G_rows[j], &mut column);
+        }
+        before.S[c] = column;
+    }
+    // Rounding must not break the symmetry that the next stage relies on.
+    for c in 0..NX {
+        for k in 0..c {
+            before.S[k][c] = before.S[c][k];
+        }
+    }
+    let L_rows = transpose(&policy.L);
+    for k in 0..NX {
+        let mut row = [0.0; NU];
+        for j in 0..NU {
+            axpy(G[k][j], &L_rows[j], &mut row);
+        }
+        before.T[k] = row;
+    }
+    for j in 0..NU {
+        for p in 0..NU {
+            before.U[p][j] = -r[j] * policy.L[p][j];
+        }
+        before.U[j][j] += r[j];
+    }
+    // An input that follows the previous one hands its own curvature on.
+    for j in 0..NU {
+        if let Hold::Linked(_) = hold[j] {
+            for p in 0..NU {
+                let mut row = if p == j { -r[j] } else { 0.0 };
+                for l in 0..NU {
+                    row += H[l][j] * policy.L[p][l];
+                }
+                before.U[p][j] += row;
+            }
+        }
+    }
+    Some(factor)
+}
+
+/// The part of [`step`] that is linear in the affine terms: constant of the policy, slopes of the value in front.
+#[inline(always)]
+pub(super) fn linear_step<const NX: usize, const NU: usize>(
+    stage: &Stage<NX, NU>,
+    factor: &Factor<NX, NU>,
+    r: &[f64; NU],
+    hold: &[Hold; NU],
+    (s, t): (&[f64; NX], &[f64; NU]),
+    policy: &mut Policy<NX, NU>,
+    (s_before, t_before): (&mut [f64; NX], &mut [f64; NU]),
+) {
+    let A_rows = transpose(&stage.A.data.0);
+    let B_rows = transpose(&stage.B.data.0);
+    let G_rows = transpose(&factor.G);
+    // y = S d + s, g = B' y + T' d + t.
+    let mut y = factor.Sd;
+    let mut g = factor.Td;
+    for k in 0..NX {
+        y[k] += s[k];
+        axpy(y[k], &B_rows[k], &mut g);
+    }
+    for j in 0..NU {
+        g[j] += t[j];
+    }
+    policy.k = [0.0; NU];
+    for j in 0..NU {
+        let constant = match hold[j] {
+            Hold::Free => -g[j],
+            Hold::Fixed(value) | Hold::Linked(value) => value,
+        };
+        axpy(constant, &factor.inverse[j], &mut policy.k);
+    }
+    *s_before = [0.0; NX];
+    for k in 0..NX {
+        axpy(y[k], &A_rows[k], s_before);
+    }
+    for j in 0..NU {
+        axpy(policy.k[j], &G_rows[j], s_before);
+        t_before[j] = -r[j] * policy.k[j];
+        if let Hold::Linked(_) = hold[j] {
+            t_before[j] += g[j];
+            for l in 0..NU {
+                t_before[j] += factor.H[l][j] * policy.k[l];
+            }
+        }
+    }
+}
+
+/// Inverts the curvature of the free inputs by Gauss-Jordan elimination without exchange of rows: the free block is positive
+/// definite, and the rows of held inputs are rows of the identity. By columns.
+#[inline(always)]
+fn invert<const NU: usize>(H: &[[f64; NU]; NU], hold: &[Hold; NU]) -> Option<[[f64; NU]; NU]> {
+    let mut matrix = *H;
+    let mut inverse = [[0.0; NU]; NU];
+    for j in 0..NU {
+        inverse[j][j] = 1.0;
+        if !matches!(hold[j], Hold::Free) {
+            for l in 0..NU {
+                matrix[l][j] = if l == j { 1.0 } else { 0.0 };
+            }
+        }
+    }
+    for j in 0..NU {
+        let pivot = matrix[j][j];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return None;
+        }
+        let scale = 1.0 / pivot;
+        for l in 0..NU {
+            matrix[l][j] *= scale;
+            inverse[l][j] *= scale;
+        }
+        for row in 0..NU {
+            if row != j {
+                let factor = matrix[j][row];
+                for l in 0..NU {
+                    matrix[l][row] -= factor * matrix[l][j];
+                    inverse[l][row] -= factor * inverse[l][j];
+                }
+            }
+        }
+    }
+    Some(inverse)
+}
+
+/// Gains of the policy from the stationarity of the free inputs and the equations of the held ones.
+#[inline(always)]
+fn policy_gains<const NX: usize, const NU: usize>(
+    factor: &Factor<NX, NU>,
+    r: &[f64; NU],
+    hold: &[Hold; NU],
+    policy: &mut Policy<NX, NU>,
+) {
+    let mut from_state = factor.inverse;
+    for j in 0..NU {
+        let (state, input) = match hold[j] {
+            Hold::Free => (-1.0, r[j]),
+            Hold::Fixed(_) => (0.0, 0.0),
+            Hold::Linked(_) => (0.0, 1.0),
+        };
+        for l in 0..NU {
+            policy.L[j][l] = input * factor.inverse[j][l];
+            from_state[j][l] *= state;
+        }
+    }
+    for c in 0..NX {
+        policy.K[c] = [0.0; NU];
+        for j in 0..NU {
+            axpy(factor.G[c][j], &from_state[j], &mut policy.K[c]);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Recursion backwards on the active set, and multipliers backwards along a plan.
+
+use super::super::optimality;
+use super::active::{self, Active};
+use super::riccati::{self, Value};
+use super::{Hold, Problem, Solution, Structured, WRONG_SIGN};
+
+/// Bounds that were left for the wrong sign of their multiplier.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Released {
+    /// How many.
+    pub count: usize,
+    /// The one with the largest scaled multiplier: sample, input, and what remains active there.
+    pub worst: Option<(usize, usize, Active)>,
+    severity: f64,
+}
+
+impl<const NX: usize, const NU: usize> Structured<NX, NU> {
+    /// Policies on the active set. Returns whether the curvature was positive throughout.
+    pub(super) fn backward(&mut self, problem: &Problem<NX, NU>) -> bool {
+        let N = self.horizon;
+        let r = &problem.r.data.0[0];
+        let mut value = terminal(problem);
+        let mut demand = [None; NU];
+        for i in (0..N).rev() {
+            if i + 1 < N {
+                for k in 0..NX {
+                    value.add_square(k, problem.q[k], problem.stages[i].x_ref[k]);
+                }
+            }
+            if self.sides[i] != 0 {
+                value.add_square(problem.soft_state, problem.soft, f64::from(self.sides[i]) * problem.soft_bound);
+            }
+            let mut hold = [Hold::Free; NU];
+            for j in 0..NU {
+                (hold[j], demand[j]) = active::hold(problem, j, self.active[i][j], demand[j]);
+            }
+            let mut before = Value::ZERO;
+            if riccati::step(&problem.stages[i], &value, r, &hold, &mut self.policies[i], &mut before).is_none() {
+                return false;
+            }
+            value = before;
+        }
+        true
+    }
+
+    /// Sets costates, multipliers and residual of the plan, and leaves the bounds whose multipliers have the wrong sign.
+    pub(super) fn multipliers(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) -> Released {
+        optimality::costates(problem, solution);
+        solution.residual = 0.0;
+        let mut released = Released::default();
+        let mut mu_next = [0.0; NU];
+        // Sample of the corner whose demand is on its way to the beginning of its block.
+        let mut corner = [None; NU];
+        for i in (0..self.horizon).rev() {
+            let (gradient, scale) = optimality::gradient(problem, solution, i);
+            for j in 0..NU {
+                let at = self.active[i][j];
+                let mut mu = mu_next[j] - gradient[j];
+                solution.mu_u[i][j] = 0.0;
+                solution.mu_du[i][j] = 0.0;
+                mu_next[j] = 0.0;
+                if at.rate != 0 {
+                    solution.mu_du[i][j] = mu;
+                    mu_next[j] = mu;
+                    if at.is_corner() {
+                        corner[j] = Some(i);
+                    }
+                    if let Some(end) = corner[j] {
+                        if i == 0 {
+                            // The block hangs on the input applied before, which implies its corner.
+                            self.settle(solution, j, (i, end), 0.0, scale[j], &mut released);
+                        }
+                    } else if self.check(i, j, at.rate, mu / scale[j], Active::NONE, &mut released) {
+                        mu_next[j] = 0.0;
+                    }
+                } else if at.level != 0 {
+                    if let Some(end) = corner[j].take() {
+                        // A level at both ends: one of the block's rows is implied by the others. The corner takes as
+                        // much as its sign allows of what the beginning cannot hold.
+                        let side = f64::from(self.active[end][j].level);
+                        let theta =
+                            if at.level == self.active[end][j].level { 0.0 } else { side * (side * mu).max(0.0) };
+                        self.settle(solution, j, (i + 1, end), theta, scale[j], &mut released);
+                        mu -= theta;
+                    }
+                    solution.mu_u[i][j] = mu;
+                    self.check(i, j, at.level, mu / scale[j], Active::NONE, &mut released);
+                } else if let Some(end) = corner[j].take() {
+                    // The block begins free: what holds it is the level at its corner.
+                    self.settle(solution, j, (i + 1, end), mu, scale[j], &mut released);
+                } else {
+                    let stationarity = mu.abs() / scale[j];
+                    // `max` would drop a NaN.
+                    if stationarity.is_nan() || stationarity > solution.residual {
+                        solution.residual = stationarity;
+                    }
+                }
+            }
+        }
+        released
+    }
+
+    /// Shares the multipliers of a block that ends in a corner between the corner's level, which takes `theta`, and the
+    /// increments.
+    fn settle(
+        &mut self,
+        solution: &mut Solution<NX, NU>,
+        j: usize,
+        (first, corner): (usize, usize),
+        theta: f64,
+        scale: f64,
+        released: &mut Released,
+    ) {
+        for l in first..=corner {
+            solution.mu_du[l][j] -= theta;
+            let at = self.active[l][j];
+            let rest = Active { level: at.level, rate: 0 };
+            self.check(l, j, at.rate, solution.mu_du[l][j] / scale, rest, released);
+        }
+        solution.mu_u[corner][j] = theta;
+        let at = self.active[corner][j];
+        if theta == 0.0 {
+            self.active[corner][j].level = 0;
+        } else {
+            let rest = Active { level: 0, rate: at.rate };
+            self.check(corner, j, at.level, theta / scale, rest, released);
+        }
+    }
+
+    /// Leaves a bound whose scaled multiplier has the wrong sign. Returns whether it did.
+    fn check(&mut self, i: usize, j: usize, side: i8, mu: f64, rest: Active, released: &mut Released) -> bool {
+        let severity = -f64::from(side) * mu;
+        if severity <= WRONG_SIGN {
+            return false;
+        }
+        released.count += 1;
+        if severity > released.severity {
+            released.severity = severity;
+            released.worst = Some((i, j, rest));
+        }
+        self.active[i][j] = rest;
+        true
+    }
+}
+
+/// Value behind the last stage.
+pub(super) fn terminal<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>) -> Value<NX, NU> {
+    let mut value = Value::ZERO;
+    value.S = problem.q_terminal.data.0;
+    if let Some(last) = problem.stages.last() {
+        value.s = (-(problem.q_terminal * last.x_ref)).data.0[0];
+    }
+    value
+}
