@@ -14,6 +14,10 @@ OK, WARNING, DISCARD, ERROR = range(4)
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
+class NotApplicable(Exception):
+    """The archive has nothing that the check could check."""
+
+
 class Callbacks(ctypes.Structure):
     _fields_ = [
         ("logger", LOGGER),
@@ -107,6 +111,13 @@ class Fmu:
     def outputs(self):
         """The outputs that must repeat bit by bit: all but the one that a clock on the wall measures."""
         return [v for v in self.named("output", "Real") if v.name != "solve_time"]
+
+    def unusable(self):
+        """A parameter and a value that pass the interface and that initialisation refuses: a file that is not there."""
+        texts = self.named("parameter", "String")
+        if not texts:
+            raise NotApplicable("this FMU has no parameter whose value only initialisation can refuse")
+        return texts[0].name, "/nowhere/at all"
 
     def slave(self, **settings):
         return Slave(self, **settings)

@@ -121,9 +121,8 @@ def check_a_state_revives_an_instance_after_an_error(fmu):
     slave.run(0, 10)
     data = slave.serialized()
     expected = slave.run(10, 20)
-    text = fmu.named("parameter", "String")[0].name
     broken = fmu.slave()
-    assert broken.set(text, "/nowhere/at all") == OK
+    assert broken.set(*fmu.unusable()) == OK
     broken.setup()
     assert broken.initialize() == ERROR
     assert broken.step(0.0, 0.01) == ERROR
@@ -205,7 +204,7 @@ def check_reset_in_every_phase_gives_a_bit_equal_rerun(fmu):
     assert slave.Reset() == OK
     rerun()
     assert slave.Reset() == OK
-    slave.set(fmu.named("parameter", "String")[0].name, "/nowhere/at all")
+    slave.set(*fmu.unusable())
     slave.setup()
     assert slave.initialize() == ERROR
     assert slave.Reset() == OK

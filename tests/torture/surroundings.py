@@ -55,7 +55,7 @@ def check_the_process_stays_as_it_was(fmu):
     slave = fmu.started()
     slave.run(0, 50)
     broken = fmu.slave()
-    broken.set(fmu.named("parameter", "String")[0].name, "/nowhere/at all")
+    broken.set(*fmu.unusable())
     broken.setup()
     assert broken.initialize() == ERROR
     broken.free(), slave.free()
