@@ -18,4 +18,34 @@ pub enum Error {
     /// A communication step that no controller can take.
     #[error("communication step must be positive and finite, got {0} s")]
     Step(f64),
+    /// A network file that is not the JSON that it should be.
+    #[error("network file is not readable: {0}")]
+    NetworkUnreadable(String),
+    /// A JSON file of some other kind.
+    #[error("network file has the format {got:?}, expected {expected:?}")]
+    NetworkFormat {
+        /// The format that is read.
+        expected: &'static str,
+        /// What the file says; empty if it says nothing.
+        got: String,
+    },
+    /// A network file of another version.
+    #[error("network file has version {got}, expected {expected}")]
+    NetworkVersion {
+        /// The version that is read.
+        expected: u32,
+        /// What the file says; 0 if it says nothing.
+        got: u32,
+    },
+    /// A network file that was changed after it was written.
+    #[error("network file is damaged: its content has the checksum {got}, it names {expected}")]
+    NetworkChecksum {
+        /// The checksum in the file.
+        expected: String,
+        /// The checksum of what the file holds.
+        got: String,
+    },
+    /// A network whose sizes or numbers are impossible.
+    #[error("network is impossible: {0}")]
+    NetworkInvalid(String),
 }

@@ -22,6 +22,7 @@ pub mod controller;
 pub mod discretise;
 mod error;
 pub mod estimator;
+pub mod jordan;
 mod ladder;
 pub mod latency;
 pub mod model;

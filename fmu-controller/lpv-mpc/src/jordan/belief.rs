@@ -1,0 +1,105 @@
+//! One stage of a roll along a trajectory: both axle forces as lines through where the stage is.
+
+use super::{Document, Measured, Memory, Network};
+use crate::model::Tyres;
+
+/// Index of the lateral velocity among the inputs.
+const V_Y: usize = 1;
+/// Index of the yaw rate among the inputs.
+const YAW_RATE: usize = 2;
+/// Index of the steering angle among the inputs.
+const DELTA: usize = 3;
+
+/// What the network says about one axle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axle {
+    /// Slip angle [rad].
+    pub alpha: f64,
+    /// Secant stiffness, force over slip [N/rad].
+    pub secant: f64,
+    /// Tangent stiffness, the change of force with slip; negative beyond the peak of the force [N/rad].
+    pub tangent: f64,
+}
+
+/// What the network says about one stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief {
+    /// Front axle.
+    pub front: Axle,
+    /// Rear axle.
+    pub rear: Axle,
+    /// How far it may be believed, 0 to 1 [1].
+    pub confidence: f64,
+}
+
+impl Belief {
+    /// Forces proportional to slip; the nominal tyres take over as far as confidence lacks.
+    #[must_use]
+    pub fn secant(&self, nominal: &Tyres) -> Tyres {
+        self.blend(&Tyres::secant(self.front.secant, self.rear.secant), nominal)
+    }
+
+    /// Forces as tangents, `F = F_0 + C_t alpha`; the nominal tyres take over as far as confidence lacks.
+    ///
+    /// The force at the stage's own slip is the secant's. A tangent stiffness below `floor` times the secant one is held
+    /// there: a prediction model with negative stiffness runs away within a horizon.
+    #[must_use]
+    pub fn tangent(&self, nominal: &Tyres, floor: f64) -> Tyres {
+        let line = |axle: &Axle| {
+            let slope = axle.tangent.max(floor * axle.secant);
+            (slope, (axle.secant - slope) * axle.alpha)
+        };
+        let ((c_f, f_f0), (c_r, f_r0)) = (line(&self.front), line(&self.rear));
+        self.blend(&Tyres { c_f, c_r, f_f0, f_r0 }, nominal)
+    }
+
+    fn blend(&self, believed: &Tyres, nominal: &Tyres) -> Tyres {
+        let share = |believed: f64, nominal: f64| nominal + self.confidence * (believed - nominal);
+        Tyres {
+            c_f: share(believed.c_f, nominal.c_f),
+            c_r: share(believed.c_r, nominal.c_r),
+            f_f0: share(believed.f_f0, nominal.f_f0),
+            f_r0: share(believed.f_r0, nominal.f_r0),
+        }
+    }
+}
+
+impl Network {
+    /// One sample like [`Network::step`], with the slope of both axle forces and the confidence.
+    ///
+    /// The network gives `C` as a function of its inputs; the tangent stiffness is `C + alpha dC/dalpha`. Steering moves the
+    /// front slip alone. Turning about the front axle, `d v_y = -l_f d yaw_rate`, moves the rear slip alone. Along these two
+    /// directions the network is differentiated exactly; the memory is held, being the past.
+    #[must_use]
+    pub fn linearise(&self, memory: &Memory, measured: &Measured) -> (Memory, Belief) {
+        let Document { l_f, l_r, inputs, outputs, .. } = &self.document;
+        let (alpha_f, alpha_r) = self.slip_angles(measured);
+        let mut along = [[0.0; super::WIDTH_MAX]; 2];
+        along[0][DELTA] = 1.0 / inputs[DELTA].deviation;
+        // alpha_r = -atan(z), so d alpha_r = -d z / (1 + z^2), and z falls by (l_f + l_r) / v_x for each unit of yaw rate.
+        let turn = measured.v_x * (1.0 + alpha_r.tan().powi(2)) / (l_f + l_r);
+        along[1][V_Y] = -l_f * turn / inputs[V_Y].deviation;
+        along[1][YAW_RATE] = turn / inputs[YAW_RATE].deviation;
+
+        let ([c_f, c_r], slopes) = self.layers.forward_along(self.standardised(memory, measured), along);
+        if !(c_f.is_finite() && c_r.is_finite()) {
+            return (*memory, self.hold(memory));
+        }
+        let memory = Memory { c_f, c_r };
+        let (secant_f, secant_r) = self.stiffness(&memory);
+        let axle = |alpha: f64, secant: f64, slope: f64| Axle { alpha, secant, tangent: secant + alpha * slope };
+        let belief = Belief {
+            front: axle(alpha_f, secant_f, outputs[0].deviation * slopes[0][0]),
+            rear: axle(alpha_r, secant_r, outputs[1].deviation * slopes[1][1]),
+            confidence: self.confidence(measured),
+        };
+        (memory, belief)
+    }
+
+    /// The last answer without belief, for inputs that are not numbers.
+    fn hold(&self, memory: &Memory) -> Belief {
+        let (c_f, c_r) = self.stiffness(memory);
+        let axle = |c: f64| Axle { alpha: 0.0, secant: c, tangent: c };
+        Belief { front: axle(c_f), rear: axle(c_r), confidence: 0.0 }
+    }
+}
