@@ -170,18 +170,7 @@ impl<const NX: usize, const NU: usize> Clarabel<NX, NU> {
             solution.slack = solution.slack.max(problem.excess(&solution.x[i + 1]));
         }
         optimality::costates(problem, solution);
-        for i in (0..N).rev() {
-            let (gradient, _) = optimality::gradient(problem, solution, i);
-            for j in (0..NU).filter(|j| is_fixed(problem, *j)) {
-                // Clarabel has no rows for such an input: whatever holds it still balances the gradient.
-                if problem.du_max[j] > 0.0 {
-                    solution.mu_u[i][j] = -gradient[j];
-                } else {
-                    let next = if i + 1 < N { solution.mu_du[i + 1][j] } else { 0.0 };
-                    solution.mu_du[i][j] = next - gradient[j];
-                }
-            }
-        }
+        optimality::balance_frozen(problem, solution);
         solution.residual = optimality::residual(problem, solution);
     }
 }
@@ -259,7 +248,7 @@ impl Data {
         self.P.push(i * columns + j, if i + 1 < N { 2.0 * weight } else { weight });
         self.P.end_column();
 
-        let fixed = is_fixed(problem, j);
+        let fixed = problem.is_frozen(j);
         for k in 0..NX {
             self.A.push(i * NX + k, unless(fixed, -problem.stages[i].B[(k, j)] * su / scaling.x[k]));
         }
@@ -305,7 +294,7 @@ impl Data {
         }
         if k == problem.soft_state {
             let row = N * NX + i * (4 * NU + 2) + 4 * NU;
-            let on = unless(!has_soft_bound(problem), 1.0);
+            let on = unless(!problem.has_soft_bound(), 1.0);
             self.A.push(row, on);
             self.A.push(row + 1, -on);
         }
@@ -318,7 +307,7 @@ impl Data {
         scaling: &Scaling<NX, NU>,
         i: usize,
     ) {
-        let on = has_soft_bound(problem);
+        let on = problem.has_soft_bound();
         // The slack's unit is the one in which its weight is one.
         let unit = unless(!on, 1.0 / (problem.soft.sqrt() * scaling.x[problem.soft_state]));
         self.P.push(i * (NX + NU + 1) + NX + NU, 2.0 * scaling.cost);
@@ -338,7 +327,7 @@ impl Data {
         self.b.clear();
         let u_prev = problem.u_prev_clamped();
         // An input that cannot move is taken out: it enters as a constant, and its own cost keeps its variable there.
-        let fixed = SVector::<f64, NU>::from_fn(|j, _| unless(!is_fixed(problem, j), u_prev[j]));
+        let fixed = SVector::<f64, NU>::from_fn(|j, _| unless(!problem.is_frozen(j), u_prev[j]));
         let mut before = problem.x_0;
         for stage in &problem.stages {
             let known = stage.A * before + stage.B * fixed + stage.d - stage.x_ref;
@@ -346,11 +335,11 @@ impl Data {
             self.b.extend(known.component_div(&scaling.x).iter());
         }
         let bound = |j: usize, value: f64| {
-            if is_fixed(problem, j) || value.is_infinite() { 1.0 } else { value / scaling.u[j] }
+            if problem.is_frozen(j) || value.is_infinite() { 1.0 } else { value / scaling.u[j] }
         };
         let k = problem.soft_state;
         let soft_bound = |value: f64| {
-            if has_soft_bound(problem) { value / scaling.x[k] } else { 1.0 }
+            if problem.has_soft_bound() { value / scaling.x[k] } else { 1.0 }
         };
         for i in 0..problem.stages.len() {
             let before = if i == 0 { u_prev } else { SVector::zeros() };
@@ -368,15 +357,6 @@ impl Data {
 /// The value, or zero where its row is not wanted.
 fn unless(off: bool, value: f64) -> f64 {
     if off { 0.0 } else { value }
-}
-
-/// Whether an input cannot move: its bounds meet or its increment is bounded by zero.
-fn is_fixed<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize) -> bool {
-    problem.u_min[j] >= problem.u_max[j] || problem.du_max[j] <= 0.0
-}
-
-fn has_soft_bound<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>) -> bool {
-    problem.soft > 0.0 && problem.soft_bound.is_finite()
 }
 
 impl<const NX: usize, const NU: usize> Clone for Clarabel<NX, NU> {

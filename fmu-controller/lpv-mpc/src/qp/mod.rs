@@ -17,4 +17,4 @@ mod structured;
 pub use clarabel::Clarabel;
 pub use problem::{Problem, Stage};
 pub use solution::{Outcome, Solution};
-pub use structured::{Perturbation, Structured};
+pub use structured::{Perturbation, Structured, Tangent};

@@ -55,6 +55,25 @@ pub fn gradient<const NX: usize, const NU: usize>(
     (gradient, scale)
 }
 
+/// Gives inputs that cannot move the multipliers that balance their gradient, for solvers that have no rows for them.
+pub(super) fn balance_frozen<const NX: usize, const NU: usize>(
+    problem: &Problem<NX, NU>,
+    solution: &mut Solution<NX, NU>,
+) {
+    let N = problem.stages.len();
+    for i in (0..N).rev() {
+        let (gradient, _) = gradient(problem, solution, i);
+        for j in (0..NU).filter(|j| problem.is_frozen(*j)) {
+            if problem.du_max[j] > 0.0 {
+                solution.mu_u[i][j] = -gradient[j];
+            } else {
+                let next = if i + 1 < N { solution.mu_du[i + 1][j] } else { 0.0 };
+                solution.mu_du[i][j] = next - gradient[j];
+            }
+        }
+    }
+}
+
 /// Range of an input, by which its errors are measured; one where it is unbounded or a single point.
 #[must_use]
 pub fn span<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize) -> f64 {

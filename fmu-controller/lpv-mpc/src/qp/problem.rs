@@ -118,6 +118,18 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
             && self.soft_bound >= 0.0
     }
 
+    /// Whether an input cannot move: its bounds meet, or its increment is bounded by zero.
+    #[must_use]
+    pub fn is_frozen(&self, j: usize) -> bool {
+        self.u_min[j] >= self.u_max[j] || self.du_max[j] <= 0.0
+    }
+
+    /// Whether the soft bound can have any effect.
+    #[must_use]
+    pub fn has_soft_bound(&self) -> bool {
+        self.soft > 0.0 && self.soft_bound.is_finite()
+    }
+
     /// Cost of a plan of states from now on and inputs; the soft bound's excess is counted with its weight.
     #[must_use]
     pub fn cost(&self, x: &[SVector<f64, NX>], u: &[SVector<f64, NU>]) -> f64 {

@@ -40,6 +40,17 @@ impl Active {
     }
 }
 
+impl Hold {
+    /// The same for differentials: bounds do not move.
+    pub(super) fn still(self) -> Self {
+        match self {
+            Self::Free => Self::Free,
+            Self::Fixed(_) => Self::Fixed(0.0),
+            Self::Linked(_) => Self::Linked(0.0),
+        }
+    }
+}
+
 /// Value of the bound of input `j` on a side.
 #[inline(always)]
 pub(super) fn level<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize, side: i8) -> f64 {

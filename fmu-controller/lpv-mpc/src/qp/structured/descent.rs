@@ -1,6 +1,5 @@
 //! From sweep to sweep: which plan and which active set go on.
 
-use super::active::Active;
 use super::rollout;
 use super::sweep::Released;
 use super::{Outcome, Problem, STATIONARY, Solution, Structured};
@@ -49,7 +48,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         false
     }
 
-    /// Takes the plan a step further. Returns whether the active set changed, or nothing when there was no step.
+    /// Takes the plan a step further. Returns whether the active set changed, or nothing while multipliers mean nothing.
     fn improve(
         &mut self,
         problem: &Problem<NX, NU>,
@@ -110,7 +109,12 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 solution.slack = solution.slack.max(problem.excess(&solution.x[i + 1]));
             }
         }
-        Some(entered)
+        if entered {
+            // Away from the target the multipliers say little; the new bound has to be answered to first.
+            *released = Released::default();
+            return None;
+        }
+        Some(false)
     }
 
     /// Cost of the plan a fraction of the way to the target.

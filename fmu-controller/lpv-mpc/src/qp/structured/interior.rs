@@ -15,6 +15,17 @@ const ITERATIONS_MAX: u32 = 40;
 /// Fraction of the way to the nearest bound that a step may go.
 const TO_BOUNDARY: f64 = 0.995;
 
+/// Complementarity, against its start, below which an active set is tried that has not settled, and the factor to the next trial.
+const POLISH_BELOW: f64 = 1e-2;
+/// Stationarity, against its start, above which the active set that shows is not yet worth a trial.
+const POLISH_STATIONARITY: f64 = 1e-1;
+/// Sweeps of a trial.
+const POLISH_SWEEPS: u32 = 3;
+/// Complementarity, against its start, at which rounding ends the method.
+const CONVERGED: f64 = 1e-13;
+/// Residual up to which the answer counts as optimal.
+const RESIDUAL_MAX: f64 = 1e-6;
+
 /// Distance to a bound, its multiplier, and the target of their product.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
@@ -71,7 +82,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 let width = upper - lower;
                 let margin = if width.is_finite() { MARGIN * width } else { MARGIN };
                 // Frozen inputs have no interior; they stay where they are.
-                let u = if is_frozen(problem, j) { p[j] } else { plan[i][j].max(lower + margin).min(upper - margin) };
+                let u = if problem.is_frozen(j) { p[j] } else { plan[i][j].max(lower + margin).min(upper - margin) };
                 self.rows[i][j] = distances(problem, j, u, p[j]);
                 self.u[i][j] = u;
             }
@@ -95,12 +106,12 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         for i in 0..N {
             for j in 0..NU {
                 for row in &mut self.rows[i][j] {
-                    row.z = if is_frozen(problem, j) || row.s.is_infinite() { 0.0 } else { mu / row.s };
+                    row.z = if problem.is_frozen(j) || row.s.is_infinite() { 0.0 } else { mu / row.s };
                 }
             }
             for (side, row) in self.soft[i].iter_mut().enumerate() {
                 *row = Row::default();
-                if has_soft(problem) {
+                if problem.has_soft_bound() {
                     let b = problem.soft_bound - if side == 0 { self.x[i][k] } else { -self.x[i][k] };
                     // s = b + z / (2 soft) and s z = mu.
                     let h = problem.soft * b;
@@ -121,14 +132,6 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
     }
 }
 
-fn has_soft<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>) -> bool {
-    problem.soft > 0.0 && problem.soft_bound.is_finite()
-}
-
-fn is_frozen<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize) -> bool {
-    problem.u_min[j] >= problem.u_max[j] || problem.du_max[j] <= 0.0
-}
-
 fn distances<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usize, u: f64, p: f64) -> Rows {
     let row = |s: f64| Row { s, ..Row::default() };
     let du = u - p;
@@ -136,56 +139,52 @@ fn distances<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usi
 }
 
 impl<const NX: usize, const NU: usize> Structured<NX, NU> {
-    /// Solves by interior points and hands the active set found over to the sweeps.
+    /// Solves by interior points. As soon as they tell the active set, sweeps make the answer exact; where a degenerate vertex
+    /// leaves no active set that stands, the answer of the interior points does.
     pub(super) fn solve_interior(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
-        let mut mu = self.interior.start(problem, &self.inputs, solution);
-        let mu_start = mu;
-        let mut polish_below = 1e-2;
-        let mut stationary = 1.0;
+        let mu_start = self.interior.start(problem, &self.inputs, solution);
+        let mut stationarity = 1.0;
+        let mut polish_below = POLISH_BELOW;
         for _ in 0..ITERATIONS_MAX {
             solution.iterations += 1;
             self.interior.set_targets(|_| 0.0);
             if !self.interior.recursion(problem, true) {
                 break;
             }
-            let affine = self.interior.directions(problem, 1.0);
+            let step = self.interior.directions(problem, 1.0);
             let settled = self.interior.predict_active();
-            let (mu_affine, count) = self.interior.complementarity(affine);
-            let (mu_now, _) = self.interior.complementarity(0.0);
+            let (mu_predicted, _) = self.interior.complementarity(step);
+            let (mu, count) = self.interior.complementarity(0.0);
             if count == 0 {
                 self.interior.advance(1.0);
-                stationary = 0.0;
-            } else {
-                let centring = (mu_affine / mu_now).powi(3);
-                self.interior.set_targets(|row| centring * mu_now - row.ds * row.dz);
-                self.interior.recursion(problem, false);
-                let alpha = self.interior.directions(problem, TO_BOUNDARY);
-                self.interior.advance(alpha);
-                mu = self.interior.complementarity(0.0).0;
-                stationary *= 1.0 - alpha;
-            }
-            if self.trace {
-                println!(
-                    "ipm {} mu {:.2e} affine {affine:.3} stat {stationary:.2e}",
-                    solution.iterations,
-                    mu / mu_start
-                );
-            }
-            if !mu.is_finite() {
                 break;
             }
-            if (settled || mu < polish_below * mu_start) && stationary < 1e-1 {
-                polish_below = polish_below.min(mu / mu_start * 1e-2);
+            let centring = (mu_predicted / mu).powi(3);
+            self.interior.set_targets(|row| centring * mu - row.ds * row.dz);
+            self.interior.recursion(problem, false);
+            let step = self.interior.directions(problem, TO_BOUNDARY);
+            self.interior.advance(step);
+            stationarity *= 1.0 - step;
+            let progress = self.interior.complementarity(0.0).0 / mu_start;
+            if !progress.is_finite() {
+                break;
+            }
+            if (settled || progress < polish_below) && stationarity < POLISH_STATIONARITY {
+                polish_below = polish_below.min(progress * POLISH_BELOW);
                 self.identify(problem);
-                if self.descend(problem, solution, 3) {
+                if self.descend(problem, solution, POLISH_SWEEPS) {
                     return;
                 }
-                if mu < 1e-13 * mu_start {
-                    break;
-                }
+            }
+            if progress < CONVERGED {
+                break;
             }
         }
-        solution.outcome = Outcome::MaxIterations;
+        self.interior.answer(problem, solution);
+        self.identify(problem);
+        if !self.backward(problem) || !solution.residual.is_finite() {
+            solution.outcome = Outcome::Breakdown;
+        }
     }
 
     /// Takes the active set that the multipliers tell.
@@ -207,7 +206,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 self.active[i][j].rate = side(&rows[2], &rows[3]);
             }
             let x = self.interior.x[i][problem.soft_state];
-            if has_soft(problem) {
+            if problem.has_soft_bound() {
                 self.sides[i] = if x > problem.soft_bound {
                     1
                 } else if x < -problem.soft_bound {
@@ -254,7 +253,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         let last = &problem.stages[N - 1];
         value.S = problem.q_terminal.data.0;
         value.s = (-(problem.q_terminal * last.x_ref)).data.0[0];
-        let has_soft = has_soft(problem);
+        let has_soft_bound = problem.has_soft_bound();
         let ks = problem.soft_state;
         for i in (0..N).rev() {
             if i + 1 < N {
@@ -262,7 +261,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                     value.add_square(k, problem.q[k], problem.stages[i].x_ref[k]);
                 }
             }
-            if has_soft {
+            if has_soft_bound {
                 for (side, row) in self.soft[i].iter().enumerate() {
                     let sign = if side == 0 { 1.0 } else { -1.0 };
                     let denominator = row.s + row.z / (2.0 * problem.soft);
@@ -276,7 +275,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             let mut hold = [Hold::Free; NU];
             let mut slope = [0.0; NU];
             for j in 0..NU {
-                if is_frozen(problem, j) {
+                if problem.is_frozen(j) {
                     hold[j] = Hold::Fixed(u_prev[j]);
                     continue;
                 }
@@ -355,7 +354,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 }
                 dp[j] = du;
             }
-            if has_soft(problem) {
+            if problem.has_soft_bound() {
                 let k = problem.soft_state;
                 let dx = self.x_new[i][k] - self.x[i][k];
                 for (side, row) in self.soft[i].iter_mut().enumerate() {
@@ -383,6 +382,29 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         self.rows.iter().flatten().flatten().for_each(&mut add);
         self.soft.iter().flatten().for_each(&mut add);
         (if count > 0 { sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX)) } else { 0.0 }, count)
+    }
+
+    /// Hands the plan and the multipliers over.
+    fn answer(&self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
+        let mut x = problem.x_0;
+        solution.slack = 0.0;
+        for (i, stage) in problem.stages.iter().enumerate() {
+            let u = SVector::from(self.u[i]);
+            x = stage.A * x + stage.B * u + stage.d;
+            solution.u[i] = u;
+            solution.x[i + 1] = x;
+            solution.slack = solution.slack.max(problem.excess(&x));
+            for j in 0..NU {
+                let rows = &self.rows[i][j];
+                solution.mu_u[i][j] = rows[0].z - rows[1].z;
+                solution.mu_du[i][j] = rows[2].z - rows[3].z;
+            }
+        }
+        optimality::costates(problem, solution);
+        optimality::balance_frozen(problem, solution);
+        solution.residual = optimality::residual(problem, solution);
+        solution.outcome =
+            if solution.residual < RESIDUAL_MAX { Outcome::InteriorPoint } else { Outcome::MaxIterations };
     }
 
     fn advance(&mut self, alpha: f64) {
