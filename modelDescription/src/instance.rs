@@ -98,23 +98,26 @@ impl<M: Model, L: Log> Instance<M, L> {
     }
 
     /// Writes variables of one type, all or none.
+    #[inline]
     pub fn write<'v>(
         &mut self,
         references: &[u32],
         kind: Kind,
-        fetch: impl Fn(usize) -> Result<Scalar<'v>, Error>,
+        fetch: impl Fn(usize) -> Scalar<'v>,
     ) -> Result<(), Error> {
         for (position, &reference) in references.iter().enumerate() {
             let (row, element) = variable::<M>(reference, kind)?;
-            self.check_settable(row, element)?;
-            let value = fetch(position)?;
+            if !self.is_settable(row) {
+                return Err(self.frozen_error(row, element));
+            }
+            let value = fetch(position);
             if !row.permits(value) {
                 return Err(range_error(row, element, value));
             }
         }
         for (position, &reference) in references.iter().enumerate() {
             let (row, element) = variable::<M>(reference, kind)?;
-            let value = fetch(position)?;
+            let value = fetch(position);
             let fits = row.set.is_some_and(|set| set(&mut self.state.model, element, value));
             if !fits {
                 return Err(range_error(row, element, value));
@@ -237,15 +240,23 @@ impl<M: Model, L: Log> Instance<M, L> {
         }
     }
 
-    fn check_settable(&self, row: &Row<M>, element: usize) -> Result<(), Error> {
-        let reason = match row.role {
-            Role::Output | Role::Local => "it is calculated",
-            Role::Parameter if self.state.phase == Phase::StepComplete => {
-                "it is a fixed parameter and initialisation is over"
-            }
-            _ => return Ok(()),
+    #[inline]
+    fn is_settable(&self, row: &Row<M>) -> bool {
+        match row.role {
+            Role::Input | Role::Tunable => true,
+            Role::Parameter => self.state.phase != Phase::StepComplete,
+            Role::Output | Role::Local => false,
+        }
+    }
+
+    #[cold]
+    fn frozen_error(&self, row: &Row<M>, element: usize) -> Error {
+        let reason = if row.role.is_calculated() {
+            "it is calculated"
+        } else {
+            "it is a fixed parameter and initialisation is over"
         };
-        Err(Error::Frozen { name: row.element_name(element), reason })
+        Error::Frozen { name: row.element_name(element), reason }
     }
 }
 
@@ -260,13 +271,23 @@ fn initialize<M: Model>(
 
 #[inline]
 fn variable<M: Model>(reference: u32, kind: Kind) -> Result<(&'static Row<M>, usize), Error> {
-    let (row, element) = M::table().lookup(reference).ok_or(Error::UnknownReference(reference))?;
-    if row.kind != kind {
-        return Err(Error::Type { name: row.element_name(element), actual: row.kind.name(), wanted: kind.name() });
+    match M::table().lookup(reference) {
+        Some((row, element)) if row.kind == kind => Ok((row, element)),
+        wrong => Err(reference_error(wrong, reference, kind)),
     }
-    Ok((row, element))
 }
 
+#[cold]
+fn reference_error<M>(found: Option<(&'static Row<M>, usize)>, reference: u32, wanted: Kind) -> Error {
+    match found {
+        None => Error::UnknownReference(reference),
+        Some((row, element)) => {
+            Error::Type { name: row.element_name(element), actual: row.kind.name(), wanted: wanted.name() }
+        }
+    }
+}
+
+#[cold]
 fn range_error<M>(row: &Row<M>, element: usize, value: Scalar<'_>) -> Error {
     let value = match value {
         Scalar::Real(value) => format!("{value:?}"),

@@ -79,6 +79,7 @@
 #[allow(unsafe_code, reason = "the C interface is made of pointers")]
 pub mod abi;
 mod clock;
+mod consistency;
 mod current;
 mod error;
 mod guid;

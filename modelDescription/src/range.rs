@@ -5,6 +5,7 @@ use crate::value::{Kind, Scalar};
 
 impl<M> Row<M> {
     /// Whether a value may be set: finite, within the limits, one of the enumeration's values.
+    #[inline]
     #[must_use]
     pub fn permits(&self, value: Scalar<'_>) -> bool {
         let within = |value: f64| {

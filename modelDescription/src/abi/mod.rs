@@ -1,17 +1,26 @@
 //! The C interface of FMI 2.0: `export_fmu!` defines its 34 functions, each of which calls one generic function here. This folder
 //! holds all unsafe code of the project: pointers become slices and references, everything else happens in `Instance`.
 //!
+//! The functions are unsafe for one reason: they trust the importer's pointers as the standard has them (FMI 2.0.4, sections 2.1 and
+//! 4.2); NULL is the only wrong pointer that can be told from a right one.
+//!
 //! Each function of an instance goes through `call`: NULL check, call sequence, panic guard, one log message, status.
 
 mod c;
 mod export;
-mod functions;
+mod instances;
 mod logger;
 mod panics;
 mod pointers;
+mod states;
+mod steps;
+mod values;
 
 pub use c::*;
-pub use functions::*;
+pub use instances::*;
+pub use states::*;
+pub use steps::*;
+pub use values::*;
 
 use self::logger::Logger;
 use crate::error::Error;

@@ -1,0 +1,105 @@
+//! Saved states behind handles, and as bytes.
+#![allow(clippy::missing_safety_doc, missing_docs, reason = "the standard documents and restricts these functions")]
+
+use std::ptr;
+
+use super::c::*;
+use super::call;
+use super::pointers::{input, output, place};
+use crate::error::Error;
+use crate::lifecycle as of;
+use crate::model::Model;
+use crate::state::State;
+
+/// The state behind an importer's handle.
+unsafe fn saved<'a, M: Model>(state: FmuState) -> Result<&'a mut State<M>, Error> {
+    // SAFETY: FMI 2.0.4, section 2.1.8: a state is NULL or was returned by this FMU and not freed.
+    unsafe { place("FMUstate", state.cast()) }
+}
+
+/// Hands a state to the importer: into the one that its handle already names, or as a new one.
+unsafe fn hand_over<M: Model>(handle: &mut FmuState, state: State<M>) {
+    // SAFETY: FMI 2.0.4, section 2.1.8: a handle that is not NULL names a state that this FMU returned and may be overwritten.
+    match unsafe { handle.cast::<State<M>>().as_mut() } {
+        Some(known) => *known = state,
+        None => *handle = Box::into_raw(Box::new(state)).cast(),
+    }
+}
+
+pub unsafe fn get_fmu_state<M: Model>(component: Component, state: *mut FmuState) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::GET_FMU_STATE, |slave| {
+            hand_over(place("FMUstate", state)?, slave.state.clone());
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn set_fmu_state<M: Model>(component: Component, state: FmuState) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::SET_FMU_STATE, |slave| {
+            slave.restore(saved(state)?.clone());
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn free_fmu_state<M: Model>(component: Component, state: *mut FmuState) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::FREE_FMU_STATE, |_| {
+            let handle = place("FMUstate", state)?;
+            if !handle.is_null() {
+                drop(Box::from_raw(handle.cast::<State<M>>()));
+                *handle = ptr::null_mut();
+            }
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn serialized_fmu_state_size<M: Model>(component: Component, state: FmuState, size: *mut usize) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::SERIALIZED_FMU_STATE_SIZE, |_| {
+            *place("size", size)? = saved::<M>(state)?.to_bytes()?.len();
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn serialize_fmu_state<M: Model>(
+    component: Component,
+    state: FmuState,
+    bytes: *mut u8,
+    size: usize,
+) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::SERIALIZE_FMU_STATE, |_| {
+            let saved = saved::<M>(state)?.to_bytes()?;
+            let bytes = output("serializedState", bytes, size)?;
+            let target = bytes.get_mut(..saved.len()).ok_or(Error::Size { name: "size", size })?;
+            target.copy_from_slice(&saved);
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn deserialize_fmu_state<M: Model>(
+    component: Component,
+    bytes: *const u8,
+    size: usize,
+    state: *mut FmuState,
+) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::DESERIALIZE_FMU_STATE, |_| {
+            let handle = place("FMUstate", state)?;
+            hand_over(handle, State::<M>::from_bytes(input("serializedState", bytes, size)?)?);
+            Ok(Status::Ok)
+        })
+    }
+}
