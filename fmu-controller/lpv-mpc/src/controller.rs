@@ -7,7 +7,7 @@ use crate::estimator::Estimator;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE};
-use crate::mpc::{Mpc, NX_LAGS, vehicle_part};
+use crate::mpc::{Mpc, NX_LAGS, TyreModel, vehicle_part};
 use crate::parameters::{Estimation, HORIZON_MAX};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
@@ -139,10 +139,11 @@ impl Controller {
         let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, tyres, &disturbance);
+        let present = tyres.present(&x, &delivered);
+        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, &present, &disturbance);
         let reference = inputs.reference((h + p.input_delay) / p.t_s);
         let u_prev = self.u_prev;
-        let sighted = self.blind < p.horizon;
+        let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
         let (status, command) = with_mpc!(core, mpc => {
             let outcome = mpc.step(&at, &u_prev, &reference, &hold, body, tyres, &disturbance);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
@@ -169,7 +170,8 @@ impl Controller {
             measured[V_Y] = f64::NAN;
         }
         let Beliefs { body, tyres } = &self.beliefs;
-        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres);
+        let present = tyres.present(&self.estimator.x, delivered);
+        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, &present);
         (self.estimator.x, self.estimator.disturbance, complete)
     }
 

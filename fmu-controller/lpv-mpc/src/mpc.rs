@@ -37,6 +37,35 @@ pub struct Reference {
     pub v_x: SVector<f64, { HORIZON_MAX + 1 }>,
 }
 
+/// Where the axle forces of the prediction come from.
+pub trait TyreModel {
+    /// Stiffnesses at small slip.
+    fn nominal(&self) -> Tyres;
+
+    /// Axle forces around the present state and input.
+    fn present(&self, x: &State, u: &Input) -> Tyres;
+
+    /// Begins a new pass along the horizon.
+    fn restart(&mut self) {}
+
+    /// Axle forces around a state and input of the schedule; called for one stage after the other.
+    fn at(&mut self, x: &State, u: &Input) -> Tyres;
+}
+
+impl TyreModel for Tyres {
+    fn nominal(&self) -> Tyres {
+        *self
+    }
+
+    fn present(&self, _x: &State, _u: &Input) -> Tyres {
+        *self
+    }
+
+    fn at(&mut self, _x: &State, _u: &Input) -> Tyres {
+        *self
+    }
+}
+
 /// A plan that may be executed: predicted states and commands, and how many samples ago it was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan<const N_X: usize> {
@@ -130,7 +159,7 @@ impl<const N_X: usize> Mpc<N_X> {
         reference: &Reference,
         hold: &Hold,
         body: &Body,
-        tyres: &Tyres,
+        tyres: &mut impl TyreModel,
         disturbance: &Disturbance,
     ) -> Outcome {
         let continues = self.plan.is_left();
@@ -139,7 +168,7 @@ impl<const N_X: usize> Mpc<N_X> {
             self.structured.shift();
         } else {
             self.structured.reset();
-            self.expect_steady_driving(reference, body, tyres);
+            self.expect_steady_driving(reference, body, &tyres.nominal());
         }
         self.problem.x_0 = full_state(at);
         self.problem.u_prev = *u_prev;
@@ -173,14 +202,24 @@ impl<const N_X: usize> Mpc<N_X> {
     }
 
     /// Fills the stages of the quadratic programme along the schedule.
-    fn model(&mut self, reference: &Reference, hold: &Hold, body: &Body, tyres: &Tyres, disturbance: &Disturbance) {
+    fn model(
+        &mut self,
+        reference: &Reference,
+        hold: &Hold,
+        body: &Body,
+        tyres: &mut impl TyreModel,
+        disturbance: &Disturbance,
+    ) {
+        let nominal = tyres.nominal();
+        tyres.restart();
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let middle = (self.plan.x[i] + self.plan.x[i + 1]) * 0.5;
             let u = if N_X == NX { self.plan.u[i] } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
             let kappa = 0.5 * (reference.kappa[i] + reference.kappa[i + 1]);
-            let lpv = embed(&middle.fixed_rows::<NX>(0).into_owned(), &u, kappa, body, tyres, disturbance);
+            let vehicle = vehicle_part(&middle);
+            let lpv = embed(&vehicle, &u, kappa, body, &tyres.at(&vehicle, &u), disturbance);
             fill(stage, &discretise(&lpv, hold), hold);
-            stage.x_ref = steady_state(reference.v_x[i + 1], reference.kappa[i + 1], body, tyres);
+            stage.x_ref = steady_state(reference.v_x[i + 1], reference.kappa[i + 1], body, &nominal);
         }
     }
 
