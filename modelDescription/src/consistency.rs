@@ -21,6 +21,9 @@ pub(crate) fn check<M: Model>(table: &Table<M>, start: &M) -> Result<(), Error> 
         if row.set.is_none() && !row.role.is_calculated() {
             return Err(contradiction(row, "can be set by importers, but has no setter"));
         }
+        if row.kind == Kind::Integer && [row.min, row.max].into_iter().flatten().any(|bound| bound.fract() != 0.0) {
+            return Err(contradiction(row, "is an integer, but its limits are not"));
+        }
         if !row.role.is_calculated() && !row.permits(row.read(start, element)) {
             return Err(contradiction(row, "starts outside of its range"));
         }

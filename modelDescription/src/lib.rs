@@ -91,6 +91,7 @@ mod resources;
 mod state;
 #[doc(hidden)]
 pub mod table;
+mod terminals;
 mod unit;
 mod value;
 mod variables;
@@ -101,5 +102,6 @@ pub use error::Error;
 pub use lifecycle::{FUNCTIONS, Function, Phase};
 pub use model::{Category, Experiment, Info, InputDerivative, Log, Model, Outcome, Silent, Step};
 pub use table::{Enumeration, Item, Place, Role, Row, Table};
+pub use terminals::terminals;
 pub use value::{FromScalar, Kind, Scalar, Value};
 pub use xml::model_description;

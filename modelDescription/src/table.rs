@@ -87,6 +87,8 @@ pub struct Row<M> {
     pub discrete: bool,
     /// Whether reading must call `Model::refresh` first when something changed.
     pub lazy: bool,
+    /// The terminal that the variable belongs to: what is drawn and connected as one.
+    pub terminal: Option<&'static str>,
     pub(crate) get: Get<M>,
     pub(crate) set: Option<Set<M>>,
 }
@@ -133,6 +135,7 @@ impl<M> Row<M> {
             display: true,
             discrete: false,
             lazy: role.is_calculated(),
+            terminal: None,
             get,
             set,
         }
@@ -177,6 +180,12 @@ impl<M> Row<M> {
     /// Declares that a Real changes only at certain instants.
     pub const fn discrete(mut self, discrete: bool) -> Self {
         self.discrete = discrete;
+        self
+    }
+
+    /// Names the terminal that the variable belongs to.
+    pub const fn terminal(mut self, terminal: &'static str) -> Self {
+        self.terminal = Some(terminal);
         self
     }
 

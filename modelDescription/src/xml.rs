@@ -191,9 +191,12 @@ fn variable<M>(out: &mut Out, reference: u32, row: &Row<M>, element: usize, star
             }
         }
         if row.items.is_none() {
-            for (name, bound) in [("min", row.min), ("max", row.max), ("nominal", row.nominal)] {
-                attributes.extend(bound.map(|bound| (name, real(bound))));
+            for (name, bound) in [("min", row.min), ("max", row.max)] {
+                attributes.extend(bound.map(|bound| (name, limit(row.kind, bound))));
             }
+        }
+        if row.kind == Kind::Real {
+            attributes.extend(row.nominal.map(|nominal| ("nominal", real(nominal))));
         }
         if !row.role.is_calculated() {
             attributes.push(("start", text(start)));
@@ -258,6 +261,11 @@ fn text(value: Scalar<'_>) -> String {
         Scalar::Boolean(value) => value.to_string(),
         Scalar::String(value) => value.to_owned(),
     }
+}
+
+/// A limit in the type of its variable: the schema wants integers of an Integer.
+fn limit(kind: Kind, bound: f64) -> String {
+    if kind == Kind::Integer { format!("{bound:.0}") } else { real(bound) }
 }
 
 /// The shortest text that gives the same number back.

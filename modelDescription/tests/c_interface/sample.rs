@@ -85,8 +85,8 @@ impl Model for Sample {
 
     fn table() -> &'static Table<Self> {
         variables! { Sample;
-            Input     u            ["m/s"]  "Input", min -10.0, max 10.0 => u;
-            Input     weights [3]  ["1"]    "Weights of the history" => weights;
+            Input     u            ["m/s"]  "Input", terminal "drive", min -10.0, max 10.0 => u;
+            Input     weights [3]  ["1"]    "Weights of the history", terminal "settings" => weights;
             Tunable   gain         ["1/s"]  "Gain", min 0.0, nominal 2.0 => gain;
             Parameter trouble               "What the next step does", items &TROUBLE
                 => { get |m| m.trouble as i32, set |m, v: i32| m.trouble = Trouble::from(v) };
@@ -96,7 +96,7 @@ impl Model for Sample {
             Output    y            ["m"]    "Integral of gain * u", depends &[], lazy false => y;
             Output    history [4]  ["m"]    "The last values, newest first", depends &[], lazy false => |m, k| m.history[3 - k];
             Output    count                 "Number of steps", depends &[] => count;
-            Output    double_u     ["m/s"]  "Twice the input", depends &["u"] => double_u;
+            Output    double_u     ["m/s"]  "Twice the input", depends &["u"], terminal "echo" => double_u;
             Output    moving                "Whether there is input" => { get |m| m.u != 0.0 };
             Output    title                 "The label again", depends &[] => |m| m.label;
             Output    scaled [3]   ["rad"]  "Weights times the input" => { get |m, k| m.weights[k] * m.u };

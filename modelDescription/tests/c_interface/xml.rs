@@ -13,8 +13,11 @@ use crate::sample::Sample;
 type Element = (String, BTreeMap<String, String>);
 
 fn elements() -> Vec<Element> {
-    let xml = model_description::model_description::<Sample>().unwrap();
-    let mut reader = Reader::from_str(&xml);
+    read(&model_description::model_description::<Sample>().unwrap())
+}
+
+fn read(xml: &str) -> Vec<Element> {
+    let mut reader = Reader::from_str(xml);
     let mut elements = Vec::new();
     loop {
         match reader.read_event().unwrap() {
@@ -78,6 +81,8 @@ fn a_variable_has_type_unit_limits_and_start() {
         (tag.as_str(), enumeration["declaredType"].as_str(), enumeration["start"].as_str()),
         ("Enumeration", "Trouble", "0")
     );
+    let (tag, integer) = typed("limit");
+    assert_eq!((tag.as_str(), integer["min"].as_str(), integer["max"].as_str()), ("Integer", "1", "1000"));
     assert_eq!(typed("label").1["start"], "ü & <b>");
     assert!(!typed("y").1.contains_key("start"), "a calculated variable has no start value");
 }
@@ -139,4 +144,24 @@ fn a_guid_has_the_form_of_one() {
     let groups: Vec<_> = guid.trim_start_matches('{').trim_end_matches('}').split('-').map(str::len).collect();
     assert_eq!(groups, [8, 4, 4, 4, 12], "{guid}");
     assert!(guid.chars().all(|c| c.is_ascii_hexdigit() || "{}-".contains(c)));
+}
+
+#[test]
+fn terminals_hold_their_variables_by_name() {
+    let mut terminals: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut current = String::new();
+    for (tag, attributes) in read(&model_description::terminals::<Sample>().unwrap()) {
+        match tag.as_str() {
+            "Terminal" => current.clone_from(&attributes["name"]),
+            "TerminalMemberVariable" => {
+                terminals.entry(current.clone()).or_default().push(attributes["variableName"].clone());
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(terminals["settings"], ["weights[1]", "weights[2]", "weights[3]"]);
+    assert_eq!(
+        (&terminals["drive"][..], &terminals["echo"][..]),
+        (&["u".to_owned()][..], &["double_u".to_owned()][..])
+    );
 }
