@@ -53,19 +53,19 @@ pub fn real(plant: &VehiclePlant, reference: u32) -> Option<f64> {
 /// Value references are rows: append, never reorder.
 pub fn table() -> &'static Table<VehiclePlant> {
     variables! { VehiclePlant;
-        Input delta ["rad"] "Front steering angle command, positive to the left; beyond the actuator's limit it saturates", min I_MIN.delta, max I_MAX.delta => inputs.delta;
-        Input a_x ["m/s2"] "Longitudinal acceleration command of drive and brakes; negative brakes and never reverses", min I_MIN.a_x, max I_MAX.a_x => inputs.a_x;
+        Input delta ["rad"] "Front steering angle command, positive to the left; beyond the actuator's limit it saturates", terminal "command", min I_MIN.delta, max I_MAX.delta => inputs.delta;
+        Input a_x ["m/s2"] "Longitudinal acceleration command of drive and brakes; negative brakes and never reverses", terminal "command", min I_MIN.a_x, max I_MAX.a_x => inputs.a_x;
         Input wind_speed ["m/s"] "Wind, added to the manoeuvre's own", min I_MIN.wind_speed, max I_MAX.wind_speed => inputs.wind_speed;
         Input wind_direction ["rad"] "Direction that the wind blows to, in the road frame at the start; 0 is along the road", min I_MIN.wind_direction, max I_MAX.wind_direction => inputs.wind_direction;
         Input mu_scale ["1"] "Factor on the friction", min I_MIN.mu_scale, max I_MAX.mu_scale => inputs.mu_scale;
 
-        Output v_x ["m/s"] "Measured longitudinal velocity, body frame", depends &[], lazy false => measurement.v_x;
-        Output v_y ["m/s"] "Measured lateral velocity of the centre of gravity, positive to the left", depends &[], lazy false => measurement.v_y;
-        Output yaw_rate ["rad/s"] "Measured yaw rate, positive to the left", depends &[], lazy false => measurement.yaw_rate;
-        Output e_y ["m"] "Measured lateral position relative to the path, positive to the left", depends &[], lazy false => measurement.e_y;
-        Output e_psi ["rad"] "Measured vehicle heading minus path heading", depends &[], lazy false => measurement.e_psi;
-        Output kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and where the reference will be at the next 40 sample times, positive to the left", depends &[] => preview.kappa_ref;
-        Output v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times", depends &[] => preview.v_x_ref;
+        Output v_x ["m/s"] "Measured longitudinal velocity, body frame", terminal "measurement", depends &[], lazy false => measurement.v_x;
+        Output v_y ["m/s"] "Measured lateral velocity of the centre of gravity, positive to the left", terminal "measurement", depends &[], lazy false => measurement.v_y;
+        Output yaw_rate ["rad/s"] "Measured yaw rate, positive to the left", terminal "measurement", depends &[], lazy false => measurement.yaw_rate;
+        Output e_y ["m"] "Measured lateral position relative to the path, positive to the left", terminal "measurement", depends &[], lazy false => measurement.e_y;
+        Output e_psi ["rad"] "Measured vehicle heading minus path heading", terminal "measurement", depends &[], lazy false => measurement.e_psi;
+        Output kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and where the reference will be at the next 40 sample times, positive to the left", terminal "preview", depends &[] => preview.kappa_ref;
+        Output v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times", terminal "preview", depends &[] => preview.v_x_ref;
 
         Output v_x_true ["m/s"] "Longitudinal velocity, body frame", depends &[] => outputs.v_x_true;
         Output v_y_true ["m/s"] "Lateral velocity of the centre of gravity, positive to the left", depends &[] => outputs.v_y_true;

@@ -33,7 +33,7 @@ fn plant(c: &mut Criterion) {
     c.bench_function("four right-hand sides", |b| {
         b.iter(|| {
             for _ in 0..4 {
-                black_box(dynamics.evaluate(road, black_box(&x), black_box(&drive)).x_dot);
+                black_box(dynamics.rates(road, black_box(&x), black_box(&drive)));
             }
         });
     });

@@ -6,11 +6,11 @@
 /// change is below 1e-9 m, measured against steps of a tenth (test `error_after_the_lane_change_is_below_1e_7`).
 pub const H_MAX: f64 = 1e-3;
 
-/// Number of internal steps for an interval: the last one is not split off by rounding.
+/// Number of internal steps of at most `h_max` for an interval: the last one is not split off by rounding.
 #[must_use]
-pub fn count(interval: f64) -> u32 {
+pub fn count(interval: f64, h_max: f64) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "intervals are at most STEP_MAX long")]
-    let n = (interval / H_MAX - 1e-6).ceil().max(1.0) as u32;
+    let n = (interval / h_max - 1e-6).ceil().max(1.0) as u32;
     n
 }
 
@@ -43,9 +43,9 @@ mod tests {
 
     #[test]
     fn rounding_splits_off_no_step() {
-        assert_eq!(count(0.033), 33);
-        assert_eq!(count(0.033 + 1e-15), 33);
-        assert_eq!(count(1e-3), 1);
-        assert_eq!(count(1e-6), 1);
+        assert_eq!(count(0.033, H_MAX), 33);
+        assert_eq!(count(0.033 + 1e-15, H_MAX), 33);
+        assert_eq!(count(1e-3, H_MAX), 1);
+        assert_eq!(count(1e-6, H_MAX), 1);
     }
 }

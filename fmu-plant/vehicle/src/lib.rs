@@ -21,15 +21,19 @@
 
 pub mod actuators;
 pub mod aero;
+mod cones;
 pub mod dynamics;
 mod error;
+pub mod events;
 pub mod integrate;
 pub mod noise;
 pub mod parameters;
 mod plant;
 pub mod road;
 mod scalar;
+mod show;
 mod signals;
+mod smooth;
 pub mod tyre;
 
 pub use error::Error;

@@ -1,13 +1,15 @@
 //! The vehicle on its road, advanced one communication step at a time.
 
-use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Error, Inputs, Measurement, Outputs, Parameters, Preview, Road, Scalar,
+    Error, Inputs, Measurement, Parameters, Road,
     actuators::{self, Actuator, Piece, Ramp},
-    dynamics::{self, Drive, Dynamics, E_PSI, E_Y, NX, PSI, S, V_X, V_Y, X, Y, YAW_RATE},
-    integrate, noise,
+    cones::{Body, Hits},
+    dynamics::{self, Drive, Dynamics, E_PSI, E_Y, NX, PSI, S, V_X, X, Y},
+    events::{Events, Gust, Steering},
+    integrate::{self, H_MAX},
+    noise,
 };
 
 /// Longest communication step [s]: a minute holds every command longer than any use, and bounds the work of one call.
@@ -27,21 +29,28 @@ pub struct State {
     /// The inputs at the end of the last step.
     pub inputs: Inputs,
     /// The noise that is held at present.
-    noise: Measurement,
+    pub(crate) noise: Measurement,
+    /// Cones hit so far.
+    pub cones: Hits,
 }
 
-/// Constants that follow from the parameters.
+/// Constants that follow from the parameters and the road.
 #[derive(Debug, Clone)]
-struct Derived {
-    dynamics: Dynamics,
-    steering: Actuator,
-    drive: Actuator,
+pub(crate) struct Derived {
+    pub dynamics: Dynamics,
+    pub steering: Actuator,
+    pub drive: Actuator,
+    pub events: Events,
+    body: Body,
+    /// Longest internal step [s].
+    h_max: f64,
 }
 
 impl Derived {
-    fn new(p: &Parameters) -> Self {
+    fn new(p: &Parameters, road: &Road) -> Self {
+        let dynamics = Dynamics::new(p);
         Self {
-            dynamics: Dynamics::new(p),
+            dynamics,
             steering: Actuator {
                 delay: p.delay_delta,
                 tau: p.tau_delta,
@@ -56,6 +65,14 @@ impl Derived {
                 min: p.a_x_min,
                 max: p.a_x_max,
             },
+            events: Events {
+                gust: Gust::new(p),
+                steering: road.steering().map(|form| Steering::new(form, p.steer_amplitude)),
+            },
+            body: Body::new(p),
+            // The method of Runge and Kutta is stable up to 2.78 over the fastest rate; 1 leaves room for friction above
+            // the nominal one. Ordinary cars stay at H_MAX.
+            h_max: (1.0 / dynamics.fastest_rate(p)).clamp(1e-5, H_MAX),
         }
     }
 }
@@ -64,10 +81,10 @@ impl Derived {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(try_from = "Saved", into = "Saved")]
 pub struct Vehicle {
-    parameters: Parameters,
-    road: Road,
-    state: State,
-    derived: Derived,
+    pub(crate) parameters: Parameters,
+    pub(crate) road: Road,
+    pub(crate) state: State,
+    pub(crate) derived: Derived,
 }
 
 /// What is written of a vehicle; the rest follows from it.
@@ -83,7 +100,7 @@ impl TryFrom<Saved> for Vehicle {
 
     fn try_from(Saved { parameters, road, state }: Saved) -> Result<Self, Error> {
         parameters.validate()?;
-        let derived = Derived::new(&parameters);
+        let derived = Derived::new(&parameters, &road);
         Ok(Self { parameters, road, state, derived })
     }
 }
@@ -106,7 +123,7 @@ impl Vehicle {
         x[X] = start.x - parameters.e_y_0 * start.psi.sin();
         x[Y] = start.y + parameters.e_y_0 * start.psi.cos();
         x[PSI] = start.psi + parameters.e_psi_0;
-        let derived = Derived::new(&parameters);
+        let derived = Derived::new(&parameters, &road);
         let state = State {
             time: 0.0,
             x,
@@ -114,6 +131,7 @@ impl Vehicle {
             drive: actuators::State::new(&derived.drive),
             inputs: Inputs::default(),
             noise: Measurement::default(),
+            cones: Hits::default(),
         };
         let mut vehicle = Self { parameters, road, state, derived };
         vehicle.draw_noise();
@@ -166,7 +184,7 @@ impl Vehicle {
             let (push, until) = drive.piece(&self.derived.drive, now, a_x(done), until);
             // The last piece ends exactly with the step, and every piece moves time on.
             let length = if left - until <= 1e-12 { left } else { until };
-            self.integrate(length, (&steer, &push), &inputs.after(done, rates), rates);
+            self.integrate(now, length, (&steer, &push), &inputs.after(done, rates), rates);
             self.state.steering.position = steer.at(length);
             self.state.drive.position = push.at(length);
             done = if length == left { h } else { done + length };
@@ -182,15 +200,18 @@ impl Vehicle {
         Ok(())
     }
 
-    /// Integrates over one piece of both actuators.
-    fn integrate(&mut self, length: f64, (steer, push): (&Piece, &Piece), inputs: &Inputs, rates: &Inputs) {
-        let Self { derived: Derived { dynamics, .. }, road, state, .. } = self;
-        let n = integrate::count(length);
+    /// Integrates over one piece of both actuators that begins at `start`.
+    fn integrate(&mut self, start: f64, length: f64, pieces: (&Piece, &Piece), inputs: &Inputs, rates: &Inputs) {
+        let Self { derived, road, state, .. } = self;
+        let n = integrate::count(length, derived.h_max);
         let h = length / f64::from(n);
-        let still = steer.is_constant() && push.is_constant() && *rates == Inputs::ZERO;
+        let still = pieces.0.is_constant()
+            && pieces.1.is_constant()
+            && *rates == Inputs::ZERO
+            && !derived.events.act(start, start + length);
         let at = |t: f64| {
-            let Inputs { wind_speed, wind_direction, mu_scale, .. } = inputs.after(t, rates);
-            drive((steer.at(t), push.at(t)), wind(wind_speed, wind_direction), mu_scale)
+            let inputs = inputs.after(t, rates);
+            derived.drive_at(start + t, (pieces.0.at(t), pieces.1.at(t)), &inputs)
         };
         let mut drives = [at(0.0); 3];
         for i in 0..n {
@@ -198,7 +219,11 @@ impl Vehicle {
                 let t = f64::from(i) * h;
                 drives = [at(t), at(t + 0.5 * h), at(t + h)];
             }
-            state.x = integrate::rk4(&state.x, h, |stage, x| dynamics.evaluate(road, x, &drives[stage]).x_dot);
+            state.x = integrate::rk4(&state.x, h, |stage, x| derived.dynamics.rates(road, x, &drives[stage]));
+            rejoin(road, &mut state.x);
+            if !road.cones().is_empty() {
+                state.cones.add(&derived.body, [state.x[X], state.x[Y]], state.x[PSI], road.cones());
+            }
         }
     }
 
@@ -213,101 +238,35 @@ impl Vehicle {
         let index = (self.state.time / preview_step + 1e-6).floor() as u64;
         self.state.noise = noise::sample(seed, index, noise_scale);
     }
+}
 
-    /// What the sensors show.
-    #[must_use]
-    pub fn measurement(&self) -> Measurement {
-        let State { x, noise, .. } = &self.state;
-        Measurement {
-            v_x: x[V_X] + noise.v_x,
-            v_y: x[V_Y] + noise.v_y,
-            yaw_rate: x[YAW_RATE] + noise.yaw_rate,
-            e_y: x[E_Y] + noise.e_y,
-            e_psi: x[E_PSI] + noise.e_psi,
-        }
-    }
-
-    /// Curvature and speed of the path ahead.
-    #[must_use]
-    pub fn preview(&self) -> Preview {
-        self.road.preview(self.state.x[S], self.parameters.preview_step)
-    }
-
-    /// Time derivative of the preview.
-    #[must_use]
-    pub fn preview_rate(&self) -> Preview {
-        let [v_x, v_y, _, s, e_y, e_psi, ..] = self.state.x;
-        let s_dot = dynamics::progress_rate((v_x, v_y), (e_y, e_psi), self.road.curvature(s));
-        self.road.preview_rate(s, s_dot, self.parameters.preview_step)
-    }
-
-    /// Everything else that the plant shows, under the inputs of the last step.
-    #[must_use]
-    pub fn outputs(&self) -> Outputs {
-        self.outputs_under(&self.state.inputs)
-    }
-
-    /// Everything else that the plant shows, if `inputs` acted now.
-    #[must_use]
-    pub fn outputs_under(&self, inputs: &Inputs) -> Outputs {
-        let (steer, push) = self.pieces(inputs);
-        let wind = wind(inputs.wind_speed, inputs.wind_direction);
-        self.signals(&self.state.x, (steer.at(0.0), push.at(0.0)), wind, inputs.mu_scale)
-    }
-
-    /// How the outputs change with the inputs along the direction `seed`, exactly, by dual numbers. A command moves its actuator at once only if that has neither delay nor lag nor rate limit.
-    #[must_use]
-    pub fn outputs_along(&self, inputs: &Inputs, seed: &Inputs) -> Outputs {
-        let (steer, push) = self.pieces(inputs);
-        let Derived { steering, drive, .. } = &self.derived;
-        let dual = |value: f64, along: f64| Dual64::new(value, along);
-        let actuators = (
-            dual(steer.at(0.0), seed.delta * steering.gain(inputs.delta)),
-            dual(push.at(0.0), seed.a_x * drive.gain(inputs.a_x)),
-        );
-        let wind = wind(dual(inputs.wind_speed, seed.wind_speed), dual(inputs.wind_direction, seed.wind_direction));
-        let x = self.state.x.map(Dual64::from_re);
-        self.signals(&x, actuators, wind, dual(inputs.mu_scale, seed.mu_scale)).tangent()
-    }
-
-    /// Time derivatives of the outputs under `inputs`, exactly, by dual numbers.
-    #[must_use]
-    pub fn outputs_rate(&self, inputs: &Inputs) -> Outputs {
-        let (steer, push) = self.pieces(inputs);
-        let input_wind = wind(inputs.wind_speed, inputs.wind_direction);
-        let drive = drive((steer.at(0.0), push.at(0.0)), input_wind, inputs.mu_scale);
-        let x_dot = self.derived.dynamics.evaluate(&self.road, &self.state.x, &drive).x_dot;
-        let x = std::array::from_fn(|i| Dual64::new(self.state.x[i], x_dot[i]));
-        let actuators = (Dual64::new(steer.at(0.0), steer.rate()), Dual64::new(push.at(0.0), push.rate()));
-        self.signals(&x, actuators, input_wind.map(Dual64::from_re), Dual64::from_re(inputs.mu_scale)).tangent()
-    }
-
-    /// How both actuators move from now on under `inputs`.
-    fn pieces(&self, inputs: &Inputs) -> (Piece, Piece) {
-        let Self { state: State { steering, drive, time, .. }, derived, .. } = self;
-        let delta = Ramp { value: inputs.delta, slope: 0.0 };
-        let a_x = Ramp { value: inputs.a_x, slope: 0.0 };
-        (
-            steering.piece(&derived.steering, *time, delta, STEP_MAX).0,
-            drive.piece(&derived.drive, *time, a_x, STEP_MAX).0,
-        )
-    }
-
-    fn signals<D: Scalar>(&self, x: &[D; NX], actuators: (D, D), wind: [D; 2], mu_scale: D) -> Outputs<D> {
-        let Derived { dynamics, .. } = &self.derived;
-        let evaluation = dynamics.evaluate(&self.road, x, &drive(actuators, wind, mu_scale));
-        let finished = x[S].re() >= self.road.length();
-        Outputs::new(dynamics, x, &evaluation, actuators, (finished, 0))
+impl Derived {
+    /// What acts on the vehicle at time `t` with the actuators at `(delta, a_x)`.
+    fn drive_at(&self, t: f64, (delta, a_x): (f64, f64), inputs: &Inputs) -> Drive<f64> {
+        let (sin, cos) = inputs.wind_direction.sin_cos();
+        let wind = [inputs.wind_speed * cos, inputs.wind_speed * sin];
+        let (delta, [wind_x, wind_y]) = self.events.add(t, delta, wind);
+        let mu_scale = inputs.mu_scale;
+        Drive { delta, sin_delta: 0.0, cos_delta: 1.0, a_x, wind_x, wind_y, mu_scale }.steered(delta)
     }
 }
 
-/// The input wind as a vector in the global frame [m/s].
-fn wind<D: Scalar>(speed: D, direction: D) -> [D; 2] {
-    let (sin, cos) = direction.sin_cos();
-    [speed * cos, speed * sin]
-}
-
-/// What acts on the vehicle at these actuator positions.
-fn drive<D: Scalar>((delta, a_x): (D, D), [wind_x, wind_y]: [D; 2], mu_scale: D) -> Drive<D> {
-    Drive { delta, sin_delta: delta, cos_delta: delta, a_x, wind_x, wind_y, mu_scale }.steered(delta)
+/// Finds the path again from the place in the plane when the vehicle is about to cross the centre of the path's curve,
+/// where the nearest point jumps and no differential equation follows it.
+fn rejoin(road: &Road, x: &mut [f64; NX]) {
+    /// Distance along the path in which it is looked for [m]: half a turn of a hairpin with 15 m radius, and less than
+    /// the way to its other leg.
+    const REACH: f64 = 50.0;
+    let line = road.line();
+    // Cheap first: nearly always the vehicle is nearer to the path than the centre of its sharpest curve.
+    if x[E_Y].abs() * line.kappa_max < 1.0 - dynamics::NEAREST
+        || x[E_Y] * road.curvature(x[S]) < 1.0 - dynamics::NEAREST
+    {
+        return;
+    }
+    let (s, e_y) = line.project((x[X], x[Y]), x[S], REACH);
+    (x[S], x[E_Y]) = (s, e_y);
+    // The shorter way round: the path may have turned by more than the vehicle.
+    let difference = x[PSI] - line.pose(s).psi;
+    x[E_PSI] = difference - std::f64::consts::TAU * (difference / std::f64::consts::TAU).round();
 }

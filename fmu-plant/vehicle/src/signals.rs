@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Error, Scalar,
-    dynamics::{Dynamics, E_PSI, E_Y, Evaluation, NX, PSI, S, V_X, V_Y, X, Y, YAW_RATE},
+    dynamics::{E_PSI, E_Y, Evaluation, NX, PSI, S, V_X, V_Y, X, Y, YAW_RATE},
 };
 
 /// What the world does to the vehicle during one communication step.
@@ -124,6 +124,8 @@ pub struct Outputs<D = f64> {
     pub wind_speed_actual: D,
     /// Whether the end of the road is reached.
     pub finished: bool,
+    /// Completed laps of a closed track.
+    pub lap: i32,
     /// Cones hit so far.
     pub cones_hit: i32,
 }
@@ -131,14 +133,12 @@ pub struct Outputs<D = f64> {
 impl<D: Scalar> Outputs<D> {
     /// What follows from the state `x` and an evaluation there, with the actuators at `delta` and `a_x`.
     pub(crate) fn new(
-        dynamics: &Dynamics,
         x: &[D; NX],
         evaluation: &Evaluation<D>,
-        (delta, a_x): (D, D),
-        (finished, cones_hit): (bool, i32),
+        delta: D,
+        (finished, lap, cones_hit): (bool, i32, i32),
     ) -> Self {
-        let Evaluation { x_dot, alpha_f, alpha_r, f_yf, f_yr, peak_f, peak_r, wind } = *evaluation;
-        let (c_f_true, c_r_true) = dynamics.stiffness(evaluation);
+        let Evaluation { x_dot, alpha_f, alpha_r, f_yf, f_yr, c_f, c_r, a_x, wind, .. } = *evaluation;
         Self {
             v_x_true: x[V_X],
             v_y_true: x[V_Y],
@@ -155,13 +155,14 @@ impl<D: Scalar> Outputs<D> {
             alpha_r,
             f_yf,
             f_yr,
-            c_f_true,
-            c_r_true,
+            c_f_true: c_f,
+            c_r_true: c_r,
             delta_actual: delta,
             a_x_actual: a_x,
-            grip_usage: grip_usage((f_yf, peak_f), (f_yr, peak_r)),
+            grip_usage: grip_usage(evaluation),
             wind_speed_actual: length(wind),
             finished,
+            lap,
             cones_hit,
         }
     }
@@ -193,15 +194,26 @@ impl Outputs<Dual64> {
             grip_usage: self.grip_usage.eps,
             wind_speed_actual: self.wind_speed_actual.eps,
             finished: self.finished,
+            lap: self.lap,
             cones_hit: self.cones_hit,
         }
     }
 }
 
-/// The larger share of force over peak; a linear tyre can exceed its peak, and the share is then all of it.
-fn grip_usage<D: Scalar>(front: (D, D), rear: (D, D)) -> D {
-    let share = |(force, peak): (D, D)| if peak.re() > 0.0 { (force / peak).abs() } else { D::one() };
-    let (front, rear) = (share(front), share(rear));
+/// The larger share of the axles' grip, lateral and longitudinal force together; a linear tyre can exceed its peak, and
+/// the share is then all of it.
+fn grip_usage<D: Scalar>(evaluation: &Evaluation<D>) -> D {
+    let Evaluation { f_yf, f_yr, peak_f, peak_r, left_f, left_r, .. } = *evaluation;
+    let share = |force: D, peak: D, left: D| {
+        if peak.re() <= 0.0 {
+            return D::one();
+        }
+        let lateral = force / peak;
+        let longitudinal = -left * left + 1.0;
+        // The root of a dual zero has no derivative.
+        if longitudinal.re() > 0.0 { (lateral * lateral + longitudinal).sqrt() } else { lateral.abs() }
+    };
+    let (front, rear) = (share(f_yf, peak_f, left_f), share(f_yr, peak_r, left_r));
     let larger = if front.re() >= rear.re() { front } else { rear };
     if larger.re() > 1.0 { D::one() } else { larger }
 }

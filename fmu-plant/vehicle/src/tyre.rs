@@ -12,7 +12,7 @@ pub enum Preset {
     DryAsphalt,
     /// The magic formula of the plant that the paper cites: no falling branch.
     Alcala,
-    /// Forces proportional to the slip angle, without a limit: twice 19 and 33 kN/rad.
+    /// Forces proportional to the slip angle, without a limit: twice 19 and 33 kN/rad at rest, in proportion to the load.
     Linear,
     /// The coefficients of the parameters `tyre_b_f`, `tyre_b_r`, `tyre_c` and `tyre_e`.
     Custom,
@@ -61,7 +61,7 @@ pub struct Pacejka {
 pub enum Axle {
     /// `D sin(C atan(B a - E (B a - atan(B a))))` with `D = mu F_z`.
     MagicFormula(Pacejka),
-    /// `c a`, whatever the load: the stiffness `c` [N/rad].
+    /// `c F_z a`, whatever the friction: stiffness over load `c` [1/rad].
     Linear(f64),
 }
 
@@ -79,7 +79,13 @@ impl Axle {
                 (magic(58_900.0 / (0.82 * 8829.0), 1.0, 0.0), magic(44_700.0 / (0.82 * 6621.75), 1.0, 0.0))
             }
             // The per-tyre stiffnesses of the lane-keeping example that the paper's Table 2 comes from, two an axle.
-            Preset::Linear => (Self::Linear(2.0 * 19_000.0), Self::Linear(2.0 * 33_000.0)),
+            Preset::Linear => {
+                let load = parameters.m * parameters.g / (parameters.l_f + parameters.l_r);
+                (
+                    Self::Linear(2.0 * 19_000.0 / (load * parameters.l_r)),
+                    Self::Linear(2.0 * 33_000.0 / (load * parameters.l_f)),
+                )
+            }
             Preset::Custom => (
                 magic(parameters.tyre_b_f, parameters.tyre_c, parameters.tyre_e),
                 magic(parameters.tyre_b_r, parameters.tyre_c, parameters.tyre_e),
@@ -87,23 +93,24 @@ impl Axle {
         }
     }
 
-    /// Lateral force [N] at slip angle `alpha` [rad] with the peak `d = mu F_z` [N].
-    pub fn force<D: Scalar>(&self, alpha: D, d: D) -> D {
+    /// Lateral force [N] at slip angle `alpha` [rad] with friction `mu` [1] and load [N].
+    #[inline]
+    pub fn force<D: Scalar>(&self, alpha: D, mu: D, load: D) -> D {
         match *self {
             Self::MagicFormula(Pacejka { b, c, e }) => {
                 let ba = alpha * b;
                 let bent = if e == 0.0 { ba } else { ba - (ba - ba.atan()) * e };
-                d * (bent.atan() * c).sin()
+                mu * load * (bent.atan() * c).sin()
             }
-            Self::Linear(stiffness) => alpha * stiffness,
+            Self::Linear(stiffness) => load * alpha * stiffness,
         }
     }
 
-    /// Slope of the force at zero slip [N/rad] with the peak `d` [N].
-    pub fn cornering_stiffness<D: Scalar>(&self, d: D) -> D {
+    /// Slope of the force at zero slip [N/rad].
+    pub fn cornering_stiffness<D: Scalar>(&self, mu: D, load: D) -> D {
         match *self {
-            Self::MagicFormula(Pacejka { b, c, .. }) => d * (b * c),
-            Self::Linear(stiffness) => D::from(stiffness),
+            Self::MagicFormula(Pacejka { b, c, .. }) => mu * load * (b * c),
+            Self::Linear(stiffness) => load * stiffness,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The general track: ours, since the paper's is not published. 2 km of curves in both directions between 5 and 25 m/s
 //! under a wind of 20 to 50 m/s.
 
-use super::{Pose, Profile, Tables, Wind};
+use super::{Profile, Tables, Wind};
+use crate::smooth::{step, step_derivatives};
 
 /// Length [m].
 const LENGTH: f64 = 2000.0;
@@ -50,20 +51,13 @@ const SPEEDS: [(f64, f64); 12] = [
     (1900.0, 15.0),
 ];
 
-/// The smooth step `6 t^5 - 15 t^4 + 10 t^3` from 0 to 1 and its slope: first and second derivatives vanish at the ends.
-fn smooth_step(t: f64) -> (f64, f64) {
-    let t = t.clamp(0.0, 1.0);
-    (t * t * t * (10.0 + t * (6.0 * t - 15.0)), 30.0 * (t * (1.0 - t)).powi(2))
-}
-
 /// Curvature [1/m] and its slope.
 fn curvature(s: f64) -> (f64, f64) {
     let mut sum = (0.0, 0.0);
     for (begin, transition, arc, kappa) in CURVES {
-        let (up, up_slope) = smooth_step((s - begin) / transition);
-        let (down, down_slope) = smooth_step((s - begin - transition - arc) / transition);
-        sum.0 += kappa * (up - down);
-        sum.1 += kappa * (up_slope - down_slope) / transition;
+        let (up, down) = ((s - begin) / transition, (s - begin - transition - arc) / transition);
+        sum.0 += kappa * (step(up) - step(down));
+        sum.1 += kappa * (step_derivatives(up)[0] - step_derivatives(down)[0]) / transition;
     }
     sum
 }
@@ -73,10 +67,10 @@ fn speed(s: f64) -> (f64, f64) {
     let mut square = (SPEEDS[0].1.powi(2), 0.0);
     for pair in SPEEDS.windows(2) {
         let ((from, before), (to, after)) = (pair[0], pair[1]);
-        let (step, slope) = smooth_step((s - from) / (to - from));
+        let t = (s - from) / (to - from);
         let rise = after.powi(2) - before.powi(2);
-        square.0 += rise * step;
-        square.1 += rise * slope / (to - from);
+        square.0 += rise * step(t);
+        square.1 += rise * step_derivatives(t)[0] / (to - from);
     }
     let v = square.0.sqrt();
     (v, 0.5 * square.1 / v)
@@ -95,12 +89,9 @@ fn wind(s: f64) -> (f64, f64) {
 /// The track.
 pub(super) fn tables() -> Tables {
     Tables {
-        length: LENGTH,
-        kappa: Profile::new(LENGTH, STEP, curvature),
-        v_x: Profile::new(LENGTH, STEP, speed),
         // Against the first heading: a head wind, as in the paper's drag, that turns relative to the car in the curves.
         wind: Some(Wind { speed: Profile::new(LENGTH, STEP, wind), direction: [-1.0, 0.0] }),
-        start: Pose::default(),
+        ..Tables::plain(LENGTH, Profile::new(LENGTH, STEP, curvature), Profile::new(LENGTH, STEP, speed))
     }
 }
 

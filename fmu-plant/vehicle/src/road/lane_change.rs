@@ -28,36 +28,35 @@ fn path(x: f64) -> [f64; 4] {
     std::array::from_fn(|i| out[i] - back[i])
 }
 
-/// Curvature and its slope over arc length at longitudinal position `x`.
-fn curvature(x: f64) -> (f64, f64) {
-    let [_, y_1, y_2, y_3] = path(x);
+/// Curvature and its slope over arc length from the derivatives of the lateral position over the longitudinal one.
+fn curvature([_, y_1, y_2, y_3]: [f64; 4]) -> (f64, f64) {
     let stretch = 1.0 + y_1 * y_1;
     let kappa = y_2 / stretch.powf(1.5);
     let per_x = y_3 / stretch.powf(1.5) - 3.0 * y_1 * y_2 * y_2 / stretch.powf(2.5);
     (kappa, per_x / stretch.sqrt())
 }
 
+/// Curvature over arc length of a path that is given as lateral over longitudinal position, from `x` on.
+pub(super) fn from_lateral(mut x: f64, length: f64, path: impl Fn(f64) -> [f64; 4]) -> Profile {
+    let mut s_done = 0.0;
+    Profile::new(length, STEP, |s| {
+        // dx/ds = 1 / sqrt(1 + Y'^2), by the method of Runge and Kutta.
+        let h = s - s_done;
+        [x] = crate::integrate::rk4(&[x], h, |_, x| [1.0 / path(x[0])[1].hypot(1.0)]);
+        s_done = s;
+        curvature(path(x))
+    })
+}
+
 /// The manoeuvre at a constant speed [m/s].
 pub(super) fn tables(speed: f64) -> Tables {
     // The tangents are followed from the very start: over the entry they are straight to 1e-6 m, and cutting them off
     // there would put a kink into the curvature.
-    let mut s_done = 0.0;
-    let mut x = -ENTRY;
-    let kappa = Profile::new(LENGTH, STEP, |s| {
-        // dx/ds = 1 / sqrt(1 + Y'^2), by the method of Runge and Kutta.
-        let h = s - s_done;
-        let slope = |x: f64| 1.0 / path(x)[1].hypot(1.0);
-        [x] = crate::integrate::rk4(&[x], h, |_, x| [slope(x[0])]);
-        s_done = s;
-        curvature(x)
-    });
+    let kappa = from_lateral(-ENTRY, LENGTH, path);
     let [y, y_1, ..] = path(-ENTRY);
     Tables {
-        length: LENGTH,
-        kappa,
-        v_x: Profile::new(LENGTH, LENGTH, |_| (speed, 0.0)),
-        wind: None,
         start: Pose { x: 0.0, y, psi: y_1.atan() },
+        ..Tables::plain(LENGTH, kappa, Profile::new(LENGTH, LENGTH, |_| (speed, 0.0)))
     }
 }
 

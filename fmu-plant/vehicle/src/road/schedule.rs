@@ -12,6 +12,7 @@ const STEP: f64 = 0.01;
 #[derive(Debug, Clone)]
 pub struct Schedule {
     length: f64,
+    closed: bool,
     duration: f64,
     /// Speed held beyond the end [m/s].
     end_speed: f64,
@@ -23,7 +24,7 @@ pub struct Schedule {
 impl Schedule {
     /// Integrates the speed profile.
     #[must_use]
-    pub fn new(v_x: &Profile, length: f64) -> Self {
+    pub fn new(v_x: &Profile, length: f64, closed: bool) -> Self {
         let speed = |s: f64| v_x.at(s).max(V_MIN);
         // Simpson's rule per cell; the cells are those of the profile or finer.
         let step = 0.1_f64;
@@ -50,7 +51,7 @@ impl Schedule {
             t_done = t;
             (s, speed(s))
         });
-        Self { length, duration, end_speed: v_x.at(length), speed: v_x.clone(), time, place }
+        Self { length, closed, duration, end_speed: v_x.at(length), speed: v_x.clone(), time, place }
     }
 
     /// Speed of the reference at `s` [m/s]; never 0.
@@ -65,16 +66,30 @@ impl Schedule {
         self.duration
     }
 
-    /// Time at which the reference passes `s` [s]; before the start and beyond the end at the speed held there.
+    /// Time at which the reference passes `s` [s]; beyond the end at the speed held there, or in the next lap.
     #[must_use]
     pub fn time(&self, s: f64) -> f64 {
-        if s > self.length { self.duration + (s - self.length) / self.end_speed.max(V_MIN) } else { self.time.at(s) }
+        if self.closed {
+            let lap = (s / self.length).floor();
+            lap * self.duration + self.time.at(s - lap * self.length)
+        } else if s > self.length {
+            self.duration + (s - self.length) / self.end_speed.max(V_MIN)
+        } else {
+            self.time.at(s)
+        }
     }
 
     /// Where the reference is at time `t` [m].
     #[must_use]
     pub fn place(&self, t: f64) -> f64 {
-        if t > self.duration { self.length + (t - self.duration) * self.end_speed.max(V_MIN) } else { self.place.at(t) }
+        if self.closed {
+            let lap = (t / self.duration).floor();
+            lap * self.length + self.place.at(t - lap * self.duration)
+        } else if t > self.duration {
+            self.length + (t - self.duration) * self.end_speed.max(V_MIN)
+        } else {
+            self.place.at(t)
+        }
     }
 }
 
@@ -86,7 +101,7 @@ mod tests {
     fn place_and_time_are_inverse() {
         // v = 5 + s / 10, so t = 10 ln(1 + s / 50).
         let v_x = Profile::new(200.0, 0.1, |s| (5.0 + s / 10.0, 0.1));
-        let schedule = Schedule::new(&v_x, 200.0);
+        let schedule = Schedule::new(&v_x, 200.0, false);
         for i in 0..200 {
             let s = f64::from(i);
             let t = 10.0 * (1.0 + s / 50.0).ln();
@@ -98,7 +113,7 @@ mod tests {
     #[test]
     fn standing_road_has_a_schedule() {
         let v_x = Profile::new(10.0, 0.1, |_| (0.0, 0.0));
-        let schedule = Schedule::new(&v_x, 10.0);
+        let schedule = Schedule::new(&v_x, 10.0, false);
         assert!((schedule.duration() - 10.0 / V_MIN).abs() < 1e-9);
         assert!(schedule.place(schedule.time(3.0) + 1.0) < 3.11);
     }

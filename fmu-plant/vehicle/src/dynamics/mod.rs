@@ -1,17 +1,26 @@
 //! The nonlinear single-track model: right-hand side and everything that it computes on the way.
 //!
 //! [Kebbati, eq. (1)] with its errata corrected: the slip angles carry `+l_f w` in front and `-l_r w` behind, and the
-//! heading error turns with `kappa s'`, not with `s'` alone.
+//! heading error turns with `kappa s'`, not with `s'` alone. With all extras of the parameters off this is the paper's
+//! plant, from [`BLEND_TO`] on.
+
+mod evaluate;
+mod grip;
+mod kinematic;
+
+pub use kinematic::{BLEND_FROM, BLEND_TO, TAU};
+
+use grip::Grip;
+use kinematic::Kinematic;
 
 use crate::{
     Parameters, Scalar,
-    aero::{Aero, Forces},
-    road::Road,
+    aero::Aero,
     tyre::{self, Axle},
 };
 
 /// Number of states.
-pub const NX: usize = 9;
+pub const NX: usize = 11;
 /// Longitudinal velocity, body frame [m/s].
 pub const V_X: usize = 0;
 /// Lateral velocity, body frame [m/s].
@@ -30,9 +39,13 @@ pub const X: usize = 6;
 pub const Y: usize = 7;
 /// Global heading [rad].
 pub const PSI: usize = 8;
+/// Front slip angle behind the relaxation length [rad].
+pub const ALPHA_F: usize = 9;
+/// Rear slip angle behind the relaxation length [rad].
+pub const ALPHA_R: usize = 10;
 
 /// The states' names, in the order of the indices.
-pub const NAMES: [&str; NX] = ["v_x", "v_y", "yaw_rate", "s", "e_y", "e_psi", "x", "y", "psi"];
+pub const NAMES: [&str; NX] = ["v_x", "v_y", "yaw_rate", "s", "e_y", "e_psi", "x", "y", "psi", "alpha_f", "alpha_r"];
 
 /// Below this speed the guarded speed departs from `v_x` [m/s].
 pub const V_GUARD: f64 = 2.0;
@@ -78,11 +91,21 @@ pub struct Evaluation<D> {
     pub f_yf: D,
     /// Lateral force of the rear axle [N].
     pub f_yr: D,
-    /// Largest lateral force of the front axle [N].
+    /// Grip of the front axle, mu F_z [N].
     pub peak_f: D,
-    /// Largest lateral force of the rear axle [N].
+    /// Grip of the rear axle, mu F_z [N].
     pub peak_r: D,
-    /// Wind speed where the vehicle is [m/s].
+    /// What drive or brakes leave of the front axle's lateral force [1].
+    pub left_f: D,
+    /// What they leave of the rear axle's [1].
+    pub left_r: D,
+    /// Secant stiffness of the front tyre law [N/rad].
+    pub c_f: D,
+    /// Secant stiffness of the rear tyre law [N/rad].
+    pub c_r: D,
+    /// Acceleration that drive and brakes reach [m/s2].
+    pub a_x: D,
+    /// Wind where the vehicle is, global frame [m/s].
     pub wind: [D; 2],
 }
 
@@ -93,82 +116,55 @@ pub struct Dynamics {
     i_z_inverse: f64,
     l_f: f64,
     l_r: f64,
-    /// Peak forces `mu F_z` at rest [N].
-    peak_f: f64,
-    peak_r: f64,
+    g: f64,
+    /// Slopes of the whole road [rad].
+    grade: f64,
+    bank: f64,
+    c_rr: f64,
+    /// Inverse of the relaxation length, 0 for none [1/m].
+    relaxation: f64,
     front: Axle,
     rear: Axle,
+    grip: Grip,
     aero: Aero,
-    /// Deceleration of the rolling resistance [m/s2].
-    rolling: f64,
+    kinematic: Kinematic,
 }
 
 impl Dynamics {
     /// The constants of a vehicle.
     #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
-        let Parameters { m, i_z, l_f, l_r, g, mu, c_rr, .. } = *parameters;
+        let Parameters { m, i_z, l_f, l_r, g, c_rr, grade, bank, relaxation_length, .. } = *parameters;
         let (front, rear) = Axle::pair(parameters);
-        let per_wheelbase = mu * m * g / (l_f + l_r);
         Self {
             m_inverse: 1.0 / m,
             i_z_inverse: 1.0 / i_z,
             l_f,
             l_r,
-            peak_f: per_wheelbase * l_r,
-            peak_r: per_wheelbase * l_f,
+            g,
+            grade,
+            bank,
+            c_rr,
+            relaxation: if relaxation_length > 0.0 { 1.0 / relaxation_length } else { 0.0 },
             front,
             rear,
+            grip: Grip::new(parameters),
             aero: Aero::new(parameters),
-            rolling: c_rr * g,
+            kinematic: Kinematic { mass: m, i_z, l_f, l_r },
         }
     }
 
-    /// Everything at state `x`, on `road`, under `drive`.
-    #[inline]
-    pub fn evaluate<D: Scalar>(&self, road: &Road, x: &[D; NX], drive: &Drive<D>) -> Evaluation<D> {
-        let [v_x, v_y, w, s, e_y, e_psi, _, _, psi] = *x;
-        let Drive { delta, sin_delta, cos_delta, a_x, mu_scale, .. } = *drive;
-        let (sin_e_psi, cos_e_psi) = e_psi.sin_cos();
-        let (sin_psi, cos_psi) = psi.sin_cos();
-
-        let v_inverse = guarded(v_x).recip();
-        let alpha_f = delta - ((v_y + w * self.l_f) * v_inverse).atan();
-        let alpha_r = -((v_y - w * self.l_r) * v_inverse).atan();
-        let peak_f = mu_scale * self.peak_f;
-        let peak_r = mu_scale * self.peak_r;
-        let f_yf = self.front.force(alpha_f, peak_f);
-        let f_yr = self.rear.force(alpha_r, peak_r);
-
-        let [own_x, own_y] = road.wind(s);
-        let (wind_x, wind_y) = (drive.wind_x + own_x, drive.wind_y + own_y);
-        let Forces { f_wx, f_wy, m_wz } =
-            self.aero.forces(wind_x * cos_psi + wind_y * sin_psi - v_x, wind_y * cos_psi - wind_x * sin_psi - v_y);
-
-        let f_yf_y = f_yf * cos_delta;
-        let kappa = road.curvature(s);
-        let s_dot = (v_x * cos_e_psi - v_y * sin_e_psi) / progress(e_y * kappa);
-        let x_dot = [
-            a_x + w * v_y - (f_yf * sin_delta - f_wx) * self.m_inverse - rolling(v_x) * self.rolling,
-            (f_yf_y + f_yr + f_wy) * self.m_inverse - w * v_x,
-            (f_yf_y * self.l_f - f_yr * self.l_r + m_wz) * self.i_z_inverse,
-            s_dot,
-            v_x * sin_e_psi + v_y * cos_e_psi,
-            w - kappa * s_dot,
-            v_x * cos_psi - v_y * sin_psi,
-            v_x * sin_psi + v_y * cos_psi,
-            w,
-        ];
-        Evaluation { x_dot, alpha_f, alpha_r, f_yf, f_yr, peak_f, peak_r, wind: [wind_x, wind_y] }
-    }
-
-    /// Secant stiffnesses of both axles [N/rad].
-    pub fn stiffness<D: Scalar>(&self, evaluation: &Evaluation<D>) -> (D, D) {
-        let Evaluation { alpha_f, alpha_r, f_yf, f_yr, peak_f, peak_r, .. } = *evaluation;
-        (
-            tyre::secant_stiffness(f_yf, alpha_f, self.front.cornering_stiffness(peak_f)),
-            tyre::secant_stiffness(f_yr, alpha_r, self.rear.cornering_stiffness(peak_r)),
-        )
+    /// Rate of the fastest mode [1/s]: the tyres at the lowest guarded speed, and the relaxation at the highest speed.
+    #[must_use]
+    pub fn fastest_rate(&self, parameters: &Parameters) -> f64 {
+        /// Highest speed that the parameters allow [m/s].
+        const V_TOP: f64 = Parameters::MAX.v_x_0;
+        let Parameters { m, i_z, l_f, l_r, g, mu, .. } = *parameters;
+        let load = m * g / (l_f + l_r);
+        let c_f = self.front.cornering_stiffness(mu, load * l_r);
+        let c_r = self.rear.cornering_stiffness(mu, load * l_f);
+        let slip = ((c_f + c_r) / m).max((c_f * l_f * l_f + c_r * l_r * l_r) / i_z) / (0.5 * V_GUARD);
+        slip.max(self.relaxation * V_TOP)
     }
 }
 
@@ -185,11 +181,12 @@ fn guarded<D: Scalar>(v_x: D) -> D {
     }
 }
 
+/// How near to the centre of the curve the arc length still counts: `1 - e_y kappa` there [1].
+pub(crate) const NEAREST: f64 = 0.1;
+
 /// `1 - e_y kappa`, kept away from the centre of the curve, where no arc length belongs to a position.
 #[inline]
 fn progress<D: Scalar>(e_y_kappa: D) -> D {
-    /// A tenth: nine tenths of the way to the centre.
-    const NEAREST: f64 = 0.1;
     if e_y_kappa.re() > 1.0 - NEAREST { D::from(NEAREST) } else { -e_y_kappa + 1.0 }
 }
 
@@ -200,16 +197,8 @@ pub fn progress_rate((v_x, v_y): (f64, f64), (e_y, e_psi): (f64, f64), kappa: f6
     (v_x * cos - v_y * sin) / progress(e_y * kappa)
 }
 
-/// Rolling resistance over its value at speed: 1 from 0.5 m/s on, and a smooth odd cubic through standstill below.
-#[inline]
-fn rolling<D: Scalar>(v_x: D) -> D {
-    const FULL: f64 = 0.5;
-    if v_x.re() >= FULL {
-        D::one()
-    } else if v_x.re() <= -FULL {
-        -D::one()
-    } else {
-        let r = v_x * (1.0 / FULL);
-        r * (r * r * -0.5 + 1.5)
-    }
+/// Force of a tyre and its secant stiffness at a slip angle.
+fn tyre_force<D: Scalar>(axle: &Axle, alpha: D, mu: D, load: D) -> (D, D) {
+    let force = axle.force(alpha, mu, load);
+    (force, tyre::secant_stiffness(force, alpha, axle.cornering_stiffness(mu, load)))
 }
