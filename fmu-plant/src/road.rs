@@ -25,7 +25,7 @@ pub fn load(text: &str, parameters: &Parameters, resources: Option<&Path>) -> Re
     let path = local(text);
     let found = resources.map(|folder| folder.join(&path)).filter(|path| path.is_file()).unwrap_or(path);
     let content = read(&found).map_err(|reason| Error::File { path: found.clone(), reason })?;
-    Road::from_csv(&content).map_err(|reason| Error::Content { path: found, reason })
+    Road::from_csv_within(&content, parameters.road_tolerance).map_err(|reason| Error::Content { path: found, reason })
 }
 
 /// The path that a file URI or a plain path names.

@@ -13,8 +13,8 @@ const I_MAX: Inputs = Inputs::MAX;
 
 /// Inputs that act on the forces at once.
 const ALL: &[&str] = &["delta", "a_x", "wind_speed", "wind_direction", "mu_scale"];
-/// Inputs that act on lateral forces at once.
-const TYRES: &[&str] = &["delta", "mu_scale"];
+/// Inputs that act on lateral forces at once: drive and brakes through load transfer and combined slip.
+const TYRES: &[&str] = &["delta", "a_x", "mu_scale"];
 
 /// The inputs in the order of the table.
 const INPUTS: [fn(&mut Inputs) -> &mut f64; 5] =
@@ -80,13 +80,13 @@ pub fn table() -> &'static Table<VehiclePlant> {
         Output a_long ["m/s2"] "Longitudinal acceleration of the centre of gravity, body frame", depends ALL => outputs.a_long;
         Output alpha_f ["rad"] "Front slip angle", depends &["delta"] => outputs.alpha_f;
         Output alpha_r ["rad"] "Rear slip angle", depends &[] => outputs.alpha_r;
-        Output f_yf ["N"] "Lateral force of the front axle", nominal 1e3, depends TYRES => outputs.f_yf;
-        Output f_yr ["N"] "Lateral force of the rear axle", nominal 1e3, depends &["mu_scale"] => outputs.f_yr;
+        Output f_yf ["N"] "Lateral force of the front axle", nominal 1e3, depends ALL => outputs.f_yf;
+        Output f_yr ["N"] "Lateral force of the rear axle", nominal 1e3, depends ALL => outputs.f_yr;
         Output c_f_true ["N/rad"] "Secant stiffness of the front axle, force over slip angle", nominal 1e5, depends TYRES => outputs.c_f_true;
-        Output c_r_true ["N/rad"] "Secant stiffness of the rear axle, force over slip angle", nominal 1e5, depends &["mu_scale"] => outputs.c_r_true;
+        Output c_r_true ["N/rad"] "Secant stiffness of the rear axle, force over slip angle", nominal 1e5, depends &["a_x", "mu_scale"] => outputs.c_r_true;
         Output delta_actual ["rad"] "Steering angle after the actuator", depends &["delta"] => outputs.delta_actual;
-        Output a_x_actual ["m/s2"] "Acceleration by drive and brakes after the actuator", depends &["a_x"] => outputs.a_x_actual;
-        Output grip_usage ["1"] "Share of its grip that the more loaded axle uses", min 0.0, max 1.0, depends TYRES => outputs.grip_usage;
+        Output a_x_actual ["m/s2"] "Acceleration by drive and brakes after the actuator", depends &["a_x", "mu_scale"] => outputs.a_x_actual;
+        Output grip_usage ["1"] "Share of its grip that the more loaded axle uses", min 0.0, max 1.0, depends ALL => outputs.grip_usage;
         Output wind_speed_actual ["m/s"] "Speed of the wind where the vehicle is", depends &["wind_speed", "wind_direction"] => outputs.wind_speed_actual;
         Output finished "Whether the end of the road is reached", depends &[] => outputs.finished;
         Output cones_hit "Cones hit so far", depends &[] => outputs.cones_hit;
@@ -127,6 +127,32 @@ pub fn table() -> &'static Table<VehiclePlant> {
         Parameter e_y_0 ["m"] "Lateral error at the start", min P_MIN.e_y_0, max P_MAX.e_y_0 => parameters.e_y_0;
         Parameter e_psi_0 ["rad"] "Heading error at the start", min P_MIN.e_psi_0, max P_MAX.e_psi_0 => parameters.e_psi_0;
         Parameter v_x_0 ["m/s"] "Speed at the start; negative: the road's own", min P_MIN.v_x_0, max P_MAX.v_x_0 => parameters.v_x_0;
+
+        Parameter relaxation_length ["m"] "Length that the tyres roll until their force has built up: 0 for at once, or at least 0.05", min P_MIN.relaxation_length, max P_MAX.relaxation_length => parameters.relaxation_length;
+        Parameter load_transfer "Whether drive and brakes move load between the axles" => parameters.load_transfer;
+        Parameter h_cg ["m"] "Height of the centre of gravity, for the load transfer", min P_MIN.h_cg, max P_MAX.h_cg => parameters.h_cg;
+        Parameter combined_slip "Whether drive and brakes use up grip" => parameters.combined_slip;
+        Parameter drive_front ["1"] "Share of the drive in front", min P_MIN.drive_front, max P_MAX.drive_front => parameters.drive_front;
+        Parameter brake_front ["1"] "Share of the brakes in front", min P_MIN.brake_front, max P_MAX.brake_front => parameters.brake_front;
+        Parameter width ["m"] "Width of the body, for cones and lanes", min P_MIN.width, max P_MAX.width => parameters.width;
+        Parameter overhang_f ["m"] "Length of the body ahead of the front axle", min P_MIN.overhang_f, max P_MAX.overhang_f => parameters.overhang_f;
+        Parameter overhang_r ["m"] "Length of the body behind the rear axle", min P_MIN.overhang_r, max P_MAX.overhang_r => parameters.overhang_r;
+        Parameter grade ["rad"] "Slope of the whole road, uphill positive; added to the road's own", min P_MIN.grade, max P_MAX.grade => parameters.grade;
+        Parameter bank ["rad"] "Cross slope of the whole road, left side up positive; added to the road's own", min P_MIN.bank, max P_MAX.bank => parameters.bank;
+        Parameter patch_start ["m"] "Arc length where a patch of other friction begins in full", min P_MIN.patch_start, max P_MAX.patch_start => parameters.patch_start;
+        Parameter patch_length ["m"] "Length of the patch; 0: no patch", min P_MIN.patch_length, max P_MAX.patch_length => parameters.patch_length;
+        Parameter patch_edge ["m"] "Length of each smooth edge outside of the patch", min P_MIN.patch_edge, max P_MAX.patch_edge => parameters.patch_edge;
+        Parameter patch_mu ["1"] "Factor on the friction in the patch", min P_MIN.patch_mu, max P_MAX.patch_mu => parameters.patch_mu;
+        Parameter gust_start ["s"] "Time when the gust begins, from the start of the simulation", min P_MIN.gust_start, max P_MAX.gust_start => parameters.gust_start;
+        Parameter gust_rise ["s"] "Time in which the gust rises, and falls again", min P_MIN.gust_rise, max P_MAX.gust_rise => parameters.gust_rise;
+        Parameter gust_hold ["s"] "Time that the gust holds in between", min P_MIN.gust_hold, max P_MAX.gust_hold => parameters.gust_hold;
+        Parameter gust_speed ["m/s"] "Speed of the gust; 0: no gust", min P_MIN.gust_speed, max P_MAX.gust_speed => parameters.gust_speed;
+        Parameter gust_direction ["rad"] "Direction that the gust blows to, in the road frame at the start", min P_MIN.gust_direction, max P_MAX.gust_direction => parameters.gust_direction;
+        Parameter steer_amplitude ["rad"] "Steering angle of the manoeuvres step_steer and sine_with_dwell, added behind the actuator", min P_MIN.steer_amplitude, max P_MAX.steer_amplitude => parameters.steer_amplitude;
+        Parameter road_tolerance ["m"] "How far the smooth line may miss the points of a road file, root mean square; 0: not at all", min P_MIN.road_tolerance, max P_MAX.road_tolerance => parameters.road_tolerance;
+        Parameter radius ["m"] "Radius of the manoeuvre constant_radius, positive to the left, at least 5 to either side", min P_MIN.radius, max P_MAX.radius => parameters.radius;
+        Parameter laps "Laps of a closed track until it is finished", min P_MIN.laps as f64, max P_MAX.laps as f64 => parameters.laps;
+        Output lap "Completed laps of a closed track", depends &[] => outputs.lap;
     }
 }
 
