@@ -123,15 +123,19 @@ impl Estimator {
         let (end, _) = move_on(&self.x);
         let (x, at) = move_on(&((self.x + end) * 0.5));
 
-        let mut F = SMatrix::<f64, NZ, NZ>::identity();
-        F.fixed_view_mut::<NX, NX>(0, 0).copy_from(&at.Phi);
-        for j in [V_X, V_Y, YAW_RATE] {
-            // What an acceleration held over the step does, to first order: the walk is far from being known better.
-            F[(j, NX + j)] = duration;
+        // P <- F P F', once from the left and, since P stays symmetric, once more from the left on the transpose.
+        for _ in 0..2 {
+            for mut column in self.P.column_iter_mut() {
+                let moved = move_column(
+                    &column.fixed_rows::<NX>(0).into_owned(),
+                    &column.fixed_rows::<3>(NX).into_owned(),
+                    &at.Phi,
+                    duration,
+                );
+                column.fixed_rows_mut::<NX>(0).copy_from(&moved);
+            }
+            self.P.transpose_mut();
         }
-        F[(E_Y, NX + V_Y)] = 0.5 * duration * duration;
-        F[(E_PSI, NX + YAW_RATE)] = 0.5 * duration * duration;
-        self.P = F * self.P * F.transpose();
         for i in 0..NX {
             self.P[(i, i)] += MODEL[i] * MODEL[i] * duration;
         }
@@ -157,4 +161,19 @@ impl Estimator {
         }
         self.P -= gain * column.transpose();
     }
+}
+
+/// The state rows of `F z`: what an error of the states and of the disturbances becomes over `duration` [s].
+///
+/// An acceleration held over the step adds up to first order in the velocities and to second order in the errors on the
+/// path; it is a random walk, so more would pretend to know it better.
+fn move_column(x: &State, d: &SVector<f64, 3>, Phi: &SMatrix<f64, NX, NX>, duration: f64) -> State {
+    let mut moved = Phi * x;
+    for j in 0..3 {
+        moved[j] += duration * d[j];
+    }
+    let half_square = 0.5 * duration * duration;
+    moved[E_Y] += half_square * d[V_Y];
+    moved[E_PSI] += half_square * d[YAW_RATE];
+    moved
 }

@@ -193,6 +193,14 @@ pub fn embed(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, distu
     Lpv { A, B, d }
 }
 
+/// Rate of the fastest lateral mode for small slip, a bound by the traces of the velocity and the yaw equation [1/s].
+pub fn fastest_rate(v_x: f64, body: &Body, tyres: &Tyres) -> f64 {
+    let Body { m, i_z, l_f, l_r, .. } = *body;
+    let (c_f, c_r) = (tyres.c_f.abs(), tyres.c_r.abs());
+    let (v, _) = guarded(v_x);
+    ((c_f + c_r) / m).max((c_f * l_f * l_f + c_r * l_r * l_r) / i_z) / v
+}
+
 /// Lateral velocity [m/s] in steady cornering at speed `v_x` [m/s] on curvature `kappa` [1/m], [Rajamani, section 3.3].
 pub fn steady_lateral_velocity(v_x: f64, kappa: f64, body: &Body, tyres: &Tyres) -> f64 {
     let Body { m, l_f, l_r, .. } = *body;

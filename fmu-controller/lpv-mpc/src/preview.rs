@@ -10,14 +10,31 @@ pub const PREVIEW: usize = HORIZON_MAX + 1;
 /// A quantity now and at the next 40 sample times.
 pub type Preview = SVector<f64, PREVIEW>;
 
-/// Value of a preview `periods` after now, linear between its elements, held beyond the last.
-pub fn at(preview: &Preview, periods: f64) -> f64 {
-    let last = PREVIEW - 1;
-    let position = periods.clamp(0.0, last as f64);
+/// Index of the last element.
+const LAST: usize = PREVIEW - 1;
+
+/// Element before a moment `periods` after now, and how far it is to the next one.
+fn place(periods: f64) -> (usize, f64) {
+    let position = periods.clamp(0.0, LAST as f64);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the preview above")]
-    let index = (position as usize).min(last - 1);
-    let fraction = position - index as f64;
-    preview[index] + fraction * (preview[index + 1] - preview[index])
+    let index = position as usize;
+    (index, position - index as f64)
+}
+
+/// The part of a preview from `periods` after now on: linear between its elements, held beyond the last.
+pub fn from(preview: &Preview, periods: f64) -> Preview {
+    let (index, fraction) = place(periods);
+    Preview::from_fn(|i, _| {
+        let (before, after) = (preview[(i + index).min(LAST)], preview[(i + index + 1).min(LAST)]);
+        before + fraction * (after - before)
+    })
+}
+
+/// Value of a preview `periods` after now.
+pub fn at(preview: &Preview, periods: f64) -> f64 {
+    let (index, fraction) = place(periods);
+    let after = (index + 1).min(LAST);
+    preview[index] + fraction * (preview[after] - preview[index])
 }
 
 #[cfg(test)]
@@ -28,7 +45,12 @@ mod tests {
     fn elements_are_met_lines_are_exact_and_the_end_is_held() {
         let line = Preview::from_fn(|i, _| 2.0 * i as f64 - 3.0);
         for periods in [0.0, 1.0, 7.0, 40.0, 0.25, 39.5] {
-            assert!((at(&line, periods) - (2.0 * periods - 3.0)).abs() < 1e-12, "{periods}");
+            let moved = from(&line, periods);
+            for i in 0..PREVIEW {
+                let expected = 2.0 * (periods + i as f64).min(40.0) - 3.0;
+                assert!((moved[i] - expected).abs() < 1e-12, "{periods} {i}: {}", moved[i]);
+            }
+            assert_eq!(at(&line, periods), moved[0]);
         }
         assert_eq!(at(&line, 55.0), at(&line, 40.0));
         assert_eq!(at(&line, -1.0), at(&line, 0.0));

@@ -62,23 +62,15 @@ impl Inputs {
 
     /// Curvature `periods` after now [1/m].
     pub(crate) fn curvature(&self, periods: f64) -> f64 {
-        self.read(&self.kappa_ref, periods)
-    }
-
-    fn speed(&self, periods: f64) -> f64 {
-        self.read(&self.v_x_ref, periods)
-    }
-
-    fn read(&self, preview: &Preview, periods: f64) -> f64 {
-        if self.hold_preview { preview[0] } else { preview::at(preview, periods) }
+        if self.hold_preview { self.kappa_ref[0] } else { preview::at(&self.kappa_ref, periods) }
     }
 
     /// The reference from `latency` periods after now on.
     pub(crate) fn reference(&self, latency: f64) -> Reference {
-        Reference {
-            kappa: Preview::from_fn(|i, _| self.curvature(latency + i as f64)),
-            v_x: Preview::from_fn(|i, _| self.speed(latency + i as f64)),
-        }
+        let from = |preview: &Preview| {
+            if self.hold_preview { Preview::repeat(preview[0]) } else { preview::from(preview, latency) }
+        };
+        Reference { kappa: from(&self.kappa_ref), v_x: from(&self.v_x_ref) }
     }
 }
 
