@@ -7,6 +7,7 @@
 //! The weights of a vehicle span ten decades, so no absolute tolerance means anything. Errors of an input are measured
 //! against its range `u_max - u_min`, errors of stationarity against the curvature times that range plus the magnitude of
 //! the terms that cancel ([`optimality::residual`]).
+#![allow(clippy::needless_range_loop, reason = "matrix algebra reads as in the books with its indices")]
 
 mod clarabel;
 pub mod optimality;

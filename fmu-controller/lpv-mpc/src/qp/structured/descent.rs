@@ -1,5 +1,6 @@
 //! From sweep to sweep: which plan and which active set go on.
 
+use super::active::Active;
 use super::rollout;
 use super::sweep::Released;
 use super::{Outcome, Problem, STATIONARY, Solution, Structured};
@@ -18,6 +19,10 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     /// active set comes back, and the cycles of a plain block active set are cut.
     pub(super) fn descend(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>, limit: u32) -> bool {
         self.toggled.fill([false; NU]);
+        for j in (0..NU).filter(|j| problem.is_frozen(*j)) {
+            let there = if problem.du_max[j] > 0.0 { Active::at_level(1) } else { Active::at_rate(1) };
+            self.active.iter_mut().for_each(|active| active[j] = there);
+        }
         let mut cost = f64::INFINITY;
         let mut released = Released::default();
         for sweep in 0..limit {

@@ -59,11 +59,13 @@ pub struct Structured<const NX: usize, const NU: usize> {
     /// Inputs of the last plan, where interior points start.
     inputs: Vec<[f64; NU]>, // N
     policies: Vec<Policy<NX, NU>>, // N
+    /// Inputs that cannot move: always at a bound, whatever the sign of its multiplier.
+    frozen: [bool; NU],
     /// Inputs that went from one of their bounds to the other in this solve.
     toggled: Vec<[bool; NU]>, // N
     /// Active set of the plan at hand before bounds were left, and after.
     kept: Vec<[Active; NU]>, // N
-    left: Vec<[Active; NU]>,       // N
+    left: Vec<[Active; NU]>, // N
     /// Sides of the plan at hand.
     left_sides: Vec<i8>, // N
     /// Where a sweep leads.
@@ -82,6 +84,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             sides: vec![0; horizon],
             inputs: vec![[0.0; NU]; horizon],
             policies: vec![Policy::ZERO; horizon],
+            frozen: [false; NU],
             toggled: vec![[false; NU]; horizon],
             kept: vec![[Active::NONE; NU]; horizon],
             left: vec![[Active::NONE; NU]; horizon],
@@ -105,6 +108,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             return;
         }
         solution.x[0] = problem.x_0;
+        for j in 0..NU {
+            self.frozen[j] = problem.is_frozen(j);
+        }
         if !self.descend(problem, solution, SWEEPS_MAX) {
             self.solve_interior(problem, solution);
         }

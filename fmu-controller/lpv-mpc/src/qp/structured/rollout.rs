@@ -147,6 +147,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             let u = self.policies[i].input(&x, &p);
             x = advance(&problem.stages[i], &x, &u);
             for j in 0..NU {
+                if self.active[i][j].is_corner() {
+                    self.leave_corner(problem, (i, j), u[j]);
+                }
                 let at = self.active[i][j];
                 let u_plan = plan.u[i][j];
                 let noise = ROUNDING * optimality::span(problem, j);

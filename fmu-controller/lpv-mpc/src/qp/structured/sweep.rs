@@ -51,7 +51,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         let mut released = Released::default();
         let mut mu_next = [0.0; NU];
         // Sample of the corner whose demand is on its way to the beginning of its block.
-        let mut corner = [None; NU];
+        let mut corner: [Option<usize>; NU] = [None; NU];
         for i in (0..self.horizon).rev() {
             let (gradient, scale) = optimality::gradient(problem, solution, i);
             for j in 0..NU {
@@ -60,6 +60,16 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 solution.mu_u[i][j] = 0.0;
                 solution.mu_du[i][j] = 0.0;
                 mu_next[j] = 0.0;
+                if at.level != 0
+                    && let Some(end) = corner[j].take()
+                {
+                    // A level at both ends: one of the block's rows is implied by the others. The corner takes as much as
+                    // its sign allows of what the beginning cannot hold.
+                    let side = f64::from(self.active[end][j].level);
+                    let theta = if at.level == self.active[end][j].level { 0.0 } else { side * (side * mu).max(0.0) };
+                    self.settle(solution, j, (i + 1, end), theta, scale[j], &mut released);
+                    mu -= theta;
+                }
                 if at.rate != 0 {
                     solution.mu_du[i][j] = mu;
                     mu_next[j] = mu;
@@ -75,15 +85,6 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                         mu_next[j] = 0.0;
                     }
                 } else if at.level != 0 {
-                    if let Some(end) = corner[j].take() {
-                        // A level at both ends: one of the block's rows is implied by the others. The corner takes as
-                        // much as its sign allows of what the beginning cannot hold.
-                        let side = f64::from(self.active[end][j].level);
-                        let theta =
-                            if at.level == self.active[end][j].level { 0.0 } else { side * (side * mu).max(0.0) };
-                        self.settle(solution, j, (i + 1, end), theta, scale[j], &mut released);
-                        mu -= theta;
-                    }
                     solution.mu_u[i][j] = mu;
                     self.check(i, j, at.level, mu / scale[j], Active::NONE, &mut released);
                 } else if let Some(end) = corner[j].take() {
@@ -131,7 +132,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     /// Leaves a bound whose scaled multiplier has the wrong sign. Returns whether it did.
     fn check(&mut self, i: usize, j: usize, side: i8, mu: f64, rest: Active, released: &mut Released) -> bool {
         let severity = -f64::from(side) * mu;
-        if severity <= WRONG_SIGN {
+        if severity <= WRONG_SIGN || self.frozen[j] {
             return false;
         }
         released.count += 1;
