@@ -78,16 +78,16 @@ const ESTIMATION: Enumeration = Enumeration {
 /// Value references are rows: append, never reorder.
 pub fn table() -> &'static Table<LpvMpcController> {
     variables! { LpvMpcController;
-        Input v_x ["m/s"] "Longitudinal velocity, body frame" => inputs.v_x;
-        Input v_y ["m/s"] "Lateral velocity of the centre of gravity, positive to the left" => inputs.v_y;
-        Input yaw_rate ["rad/s"] "Yaw rate, positive to the left" => inputs.yaw_rate;
-        Input e_y ["m"] "Lateral position relative to the path, positive to the left" => inputs.e_y;
-        Input e_psi ["rad"] "Vehicle heading minus path heading" => inputs.e_psi;
-        Input kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and at the next 40 sample times, positive to the left" => inputs.kappa_ref;
-        Input v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times" => inputs.v_x_ref;
+        Input v_x ["m/s"] "Longitudinal velocity, body frame", terminal "measurement" => inputs.v_x;
+        Input v_y ["m/s"] "Lateral velocity of the centre of gravity, positive to the left", terminal "measurement" => inputs.v_y;
+        Input yaw_rate ["rad/s"] "Yaw rate, positive to the left", terminal "measurement" => inputs.yaw_rate;
+        Input e_y ["m"] "Lateral position relative to the path, positive to the left", terminal "measurement" => inputs.e_y;
+        Input e_psi ["rad"] "Vehicle heading minus path heading", terminal "measurement" => inputs.e_psi;
+        Input kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and at the next 40 sample times, positive to the left", terminal "preview" => inputs.kappa_ref;
+        Input v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times", terminal "preview" => inputs.v_x_ref;
 
-        Output delta ["rad"] "Front steering angle command" => { get |m| m.controller.output().delta };
-        Output a_x ["m/s2"] "Longitudinal acceleration command" => { get |m| m.controller.output().a_x };
+        Output delta ["rad"] "Front steering angle command", terminal "command" => { get |m| m.controller.output().delta };
+        Output a_x ["m/s2"] "Longitudinal acceleration command", terminal "command" => { get |m| m.controller.output().a_x };
         Output c_f ["N/rad"] "Front cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_f };
         Output c_r ["N/rad"] "Rear cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_r };
         Output status "How good the present command is", items &STATUS => { get |m| m.controller.output().status as i32 };
