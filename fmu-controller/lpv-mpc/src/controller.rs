@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
+use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, V_X, V_Y, YAW_RATE};
 use crate::mpc::{Mpc, NX_LAGS, TyreModel, vehicle_part};
-use crate::parameters::{Estimation, HORIZON_MAX};
+use crate::parameters::{Adaptation, Estimation, HORIZON_MAX};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
 
@@ -32,10 +34,10 @@ macro_rules! with_mpc {
 }
 
 /// What the controller holds to be true, derived from its parameters.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Beliefs {
     body: Body,
-    tyres: Tyres,
+    tyres: Adapter,
 }
 
 /// Adaptive LPV-MPC of steering and speed.
@@ -58,17 +60,32 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller whose first sample is at time `start` [s], wheels straight.
+    /// A controller whose first sample is at time `start` [s], wheels straight, without a network.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] names the first parameter outside its range, [`Error::NoNetwork`] an adaptation that needs one.
+    pub fn new(parameters: Parameters, start: f64) -> Result<Self, Error> {
+        if parameters.adaptation != Adaptation::Constant {
+            return Err(Error::NoNetwork);
+        }
+        Self::build(parameters, start, None)
+    }
+
+    /// A controller that may adapt its tyres by a trained network.
     ///
     /// # Errors
     /// [`Error::Parameter`] names the first parameter outside its range.
-    pub fn new(parameters: Parameters, start: f64) -> Result<Self, Error> {
+    pub fn with_network(parameters: Parameters, start: f64, network: Network) -> Result<Self, Error> {
+        Self::build(parameters, start, Some(network))
+    }
+
+    fn build(parameters: Parameters, start: f64, network: Option<Network>) -> Result<Self, Error> {
         parameters.validate()?;
         let p = &parameters;
         let tau = [p.tau_delta, p.tau_a_x];
         let tyres = p.nominal_tyres();
         Ok(Self {
-            beliefs: Beliefs { body: p.body(), tyres },
+            beliefs: Beliefs { body: p.body(), tyres: Adapter::new(p.adaptation, tyres, network) },
             estimator: Estimator::new(p.sensor_noise),
             blind: 0,
             core: if tau == [0.0, 0.0] {
@@ -98,7 +115,7 @@ impl Controller {
         parameters.validate()?;
         self.parameters.clone_from(parameters);
         self.beliefs.body = parameters.body();
-        self.beliefs.tyres = parameters.nominal_tyres();
+        self.beliefs.tyres.tune(parameters.nominal_tyres());
         with_mpc!(&mut self.core, mpc => mpc.tune(parameters));
         Ok(())
     }
@@ -139,8 +156,8 @@ impl Controller {
         let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-        let present = tyres.present(&x, &delivered);
-        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, &present, &disturbance);
+        tyres.observe(&x, &delivered);
+        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, tyres.present(), &disturbance);
         let reference = inputs.reference((h + p.input_delay) / p.t_s);
         let u_prev = self.u_prev;
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
@@ -170,8 +187,7 @@ impl Controller {
             measured[V_Y] = f64::NAN;
         }
         let Beliefs { body, tyres } = &self.beliefs;
-        let present = tyres.present(&self.estimator.x, delivered);
-        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, &present);
+        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres.present());
         (self.estimator.x, self.estimator.disturbance, complete)
     }
 
@@ -179,8 +195,7 @@ impl Controller {
         let Self { output, .. } = self;
         output.delta = self.u_prev[DELTA];
         output.a_x = self.u_prev[A_X];
-        output.c_f = self.beliefs.tyres.c_f;
-        output.c_r = self.beliefs.tyres.c_r;
+        (output.c_f, output.c_r, output.confidence) = self.beliefs.tyres.believed();
         output.status = status;
         with_mpc!(&self.core, mpc => {
             (output.iterations, output.kkt_residual, output.slack_e_y) = mpc.diagnostics();

@@ -15,6 +15,9 @@ pub enum Error {
         /// The offending value.
         value: f64,
     },
+    /// Adaptation by a network without one.
+    #[error("adaptation by a network needs a network file")]
+    NoNetwork,
     /// A communication step that no controller can take.
     #[error("communication step must be positive and finite, got {0} s")]
     Step(f64),

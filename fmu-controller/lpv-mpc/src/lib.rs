@@ -18,6 +18,7 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
 
+pub mod adaptation;
 pub mod controller;
 pub mod discretise;
 mod error;

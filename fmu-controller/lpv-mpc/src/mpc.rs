@@ -42,9 +42,6 @@ pub trait TyreModel {
     /// Stiffnesses at small slip.
     fn nominal(&self) -> Tyres;
 
-    /// Axle forces around the present state and input.
-    fn present(&self, x: &State, u: &Input) -> Tyres;
-
     /// Begins a new pass along the horizon.
     fn restart(&mut self) {}
 
@@ -54,10 +51,6 @@ pub trait TyreModel {
 
 impl TyreModel for Tyres {
     fn nominal(&self) -> Tyres {
-        *self
-    }
-
-    fn present(&self, _x: &State, _u: &Input) -> Tyres {
         *self
     }
 

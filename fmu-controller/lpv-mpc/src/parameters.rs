@@ -18,6 +18,10 @@ pub enum Adaptation {
     /// The nominal stiffnesses, always.
     #[default]
     Constant,
+    /// The network's answer at the measurement, held along the horizon, as in the paper.
+    NetworkNow,
+    /// The network rolled along the previous plan, one stage at a time.
+    NetworkHorizon,
 }
 
 /// Where the state that the plan starts from comes from.

@@ -85,6 +85,8 @@ pub struct Output {
     pub c_f: f64,
     /// Rear cornering stiffness that the controller believes in [N/rad].
     pub c_r: f64,
+    /// How far the network is believed: 0 the nominal stiffnesses, 1 the network's [1].
+    pub confidence: f64,
     /// How good the command is.
     pub status: Status,
     /// Iterations of the solver.
@@ -118,6 +120,7 @@ impl Output {
             a_x: 0.0,
             c_f: tyres.c_f,
             c_r: tyres.c_r,
+            confidence: 0.0,
             status: Status::Optimal,
             iterations: 0,
             kkt_residual: 0.0,
