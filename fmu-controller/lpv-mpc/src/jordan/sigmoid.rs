@@ -13,38 +13,56 @@ const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 /// `exp(-36.8)` is the rounding of 1: beyond this the function is 0 or 1 within it, and the exponent cannot overflow.
 const SATURATED: f64 = 40.0;
 
+/// Elements that are computed side by side: short chains of dependent operations hide behind each other.
+const LANES: usize = 4;
+/// Coefficients of Taylor's polynomial, `1 / k!`.
+const TAYLOR: [f64; 13] = [
+    1.0,
+    1.0,
+    0.5,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5_040.0,
+    1.0 / 40_320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
+];
+
 /// `exp(x)` for `|x| <= 40`, relative error below 1e-15: `2^k exp(r)` with `|r| <= ln 2 / 2` and Taylor's polynomial of
-/// degree 12, whose first neglected term is 2e-16.
+/// degree 12, whose first neglected term is 2e-16. Estrin's scheme instead of Horner's: a third of the latency.
 #[inline]
 fn exp(x: f64) -> f64 {
     let shifted = x * std::f64::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (x - k * LN_2_HIGH) - k * LN_2_LOW;
-    let mut p = 1.0 / 479_001_600.0;
-    for c in [
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-        1.0,
-        1.0,
-    ] {
-        p = p * r + c;
-    }
+    let c = TAYLOR;
+    let (r_2, r_4) = (r * r, (r * r) * (r * r));
+    let four = |i: usize| (c[i] + c[i + 1] * r) + (c[i + 2] + c[i + 3] * r) * r_2;
+    let p = four(0) + (four(4) + (four(8) + c[12] * r_4) * r_4) * r_4;
     p * f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
+}
+
+#[inline]
+fn logistic(z: f64) -> f64 {
+    // The order of the comparisons maps to one instruction each and lets NaN through.
+    let z = if z > SATURATED { SATURATED } else { z };
+    let z = if z < -SATURATED { -SATURATED } else { z };
+    1.0 / (1.0 + exp(-z))
 }
 
 /// `1 / (1 + exp(-z))` of every element, in place.
 #[inline]
 pub fn sigmoid(values: &mut [f64]) {
-    for z in values {
-        *z = 1.0 / (1.0 + exp((-*z).clamp(-SATURATED, SATURATED)));
+    let (chunks, rest) = values.as_chunks_mut::<LANES>();
+    for chunk in chunks {
+        *chunk = chunk.map(logistic);
+    }
+    for z in rest {
+        *z = logistic(*z);
     }
 }
 
@@ -70,5 +88,8 @@ mod tests {
         sigmoid(&mut values);
         assert!(values[0] < 1e-17 && values[1] < 1e-17, "{values:?}");
         assert_eq!(values[2..], [0.5, 1.0, 1.0]);
+        let mut values = [f64::NAN];
+        sigmoid(&mut values);
+        assert!(values[0].is_nan());
     }
 }
