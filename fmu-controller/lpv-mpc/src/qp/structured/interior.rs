@@ -49,8 +49,8 @@ pub(super) struct Interior<const NX: usize, const NU: usize> {
     soft: Vec<[Row; 2]>,
     u: Vec<[f64; NU]>,
     x: Vec<[f64; NX]>,
-    u_new: Vec<[f64; NU]>,
-    x_new: Vec<[f64; NX]>,
+    du: Vec<[f64; NU]>,
+    dx: Vec<[f64; NX]>,
     policies: Vec<Policy<NX, NU>>,
     factors: Vec<Factor<NX, NU>>,
 }
@@ -62,8 +62,8 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             soft: vec![[Row::default(); 2]; horizon],
             u: vec![[0.0; NU]; horizon],
             x: vec![[0.0; NX]; horizon],
-            u_new: vec![[0.0; NU]; horizon],
-            x_new: vec![[0.0; NX]; horizon],
+            du: vec![[0.0; NU]; horizon],
+            dx: vec![[0.0; NX]; horizon],
             policies: vec![Policy::ZERO; horizon],
             factors: vec![Factor::ZERO; horizon],
         }
@@ -245,30 +245,31 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         settled
     }
 
-    /// Newton step as one recursion: backwards with the barrier's curvature, forwards to the new plan.
+    /// Newton step as one recursion over differences: backwards with the barrier's curvature and the slopes at the iterate,
+    /// forwards to the directions. Differences, because near the bounds the barrier's curvature times the whole input would
+    /// drown the slopes in rounding.
     fn recursion(&mut self, problem: &Problem<NX, NU>, factorise: bool) -> bool {
         let N = self.u.len();
         let u_prev = problem.u_prev_clamped();
         let mut value = Value::<NX, NU>::ZERO;
-        let last = &problem.stages[N - 1];
-        value.S = problem.q_terminal.data.0;
-        value.s = (-(problem.q_terminal * last.x_ref)).data.0[0];
         let has_soft_bound = problem.has_soft_bound();
-        let ks = problem.soft_state;
+        let soft_state = problem.soft_state;
         for i in (0..N).rev() {
+            let error = SVector::from(self.x[i]) - problem.stages[i].x_ref;
             if i + 1 < N {
                 for k in 0..NX {
-                    value.add_square(k, problem.q[k], problem.stages[i].x_ref[k]);
+                    value.S[k][k] += problem.q[k];
+                    value.s[k] += problem.q[k] * error[k];
                 }
+            } else {
+                value.S = problem.q_terminal.data.0;
+                value.s = (problem.q_terminal * error).data.0[0];
             }
             if has_soft_bound {
-                for (side, row) in self.soft[i].iter().enumerate() {
-                    let sign = if side == 0 { 1.0 } else { -1.0 };
+                for (row, sign) in self.soft[i].iter().zip([1.0, -1.0]) {
                     let denominator = row.s + row.z / (2.0 * problem.soft);
-                    let weight = 0.5 * row.z / denominator;
-                    let z = row.z + (row.target - row.s * row.z) / denominator;
-                    value.S[ks][ks] += weight;
-                    value.s[ks] += sign * 0.5 * z - weight * self.x[i][ks];
+                    value.S[soft_state][soft_state] += 0.5 * row.z / denominator;
+                    value.s[soft_state] += sign * 0.5 * (row.z + (row.target - row.s * row.z) / denominator);
                 }
             }
             let mut r = problem.r.data.0[0];
@@ -276,11 +277,11 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             let mut slope = [0.0; NU];
             for j in 0..NU {
                 if problem.is_frozen(j) {
-                    hold[j] = Hold::Fixed(u_prev[j]);
+                    hold[j] = Hold::Fixed(0.0);
                     continue;
                 }
                 let p = if i == 0 { u_prev[j] } else { self.u[i - 1][j] };
-                let u = self.u[i][j];
+                slope[j] = r[j] * (self.u[i][j] - p);
                 for (m, row) in self.rows[i][j].iter().enumerate() {
                     if row.z > 0.0 {
                         let inverse = 1.0 / row.s;
@@ -288,10 +289,10 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                         let push = -0.5 * SIGN[m] * row.target * inverse;
                         if m < 2 {
                             value.U[j][j] += weight;
-                            value.t[j] += push - weight * u;
+                            value.t[j] += push;
                         } else {
                             r[j] += weight;
-                            slope[j] += push - weight * (u - p);
+                            slope[j] += push;
                         }
                     }
                 }
@@ -299,29 +300,27 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             }
             let stage = &problem.stages[i];
             let policy = &mut self.policies[i];
+            let mut before = Value::ZERO;
             if factorise {
-                let mut before = Value::ZERO;
-                match riccati::step(stage, &value, &r, &hold, policy, &mut before) {
+                match riccati::step(stage, &[0.0; NX], &value, &r, &hold, policy, &mut before) {
                     Some(factor) => self.factors[i] = factor,
                     None => return false,
                 }
-                value = before;
             } else {
-                let mut before = Value::ZERO;
                 let after = (&value.s, &value.t);
                 riccati::linear_step(stage, &self.factors[i], &r, &hold, after, policy, (&mut before.s, &mut before.t));
-                value = before;
             }
+            value = before;
             for j in 0..NU {
                 value.t[j] -= slope[j];
             }
         }
-        let mut x = problem.x_0.data.0[0];
-        let mut p = u_prev.data.0[0];
+        let mut x = [0.0; NX];
+        let mut p = [0.0; NU];
         for i in 0..N {
             p = self.policies[i].input(&x, &p);
             let stage = &problem.stages[i];
-            let mut next = stage.d.data.0[0];
+            let mut next = [0.0; NX];
             for k in 0..NX {
                 axpy(x[k], &stage.A.data.0[k], &mut next);
             }
@@ -329,8 +328,8 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 axpy(p[j], &stage.B.data.0[j], &mut next);
             }
             x = next;
-            self.u_new[i] = p;
-            self.x_new[i] = x;
+            self.du[i] = p;
+            self.dx[i] = x;
         }
         true
     }
@@ -344,7 +343,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         let mut dp = [0.0; NU];
         for i in 0..self.u.len() {
             for j in 0..NU {
-                let du = self.u_new[i][j] - self.u[i][j];
+                let du = self.du[i][j];
                 for (m, row) in self.rows[i][j].iter_mut().enumerate() {
                     if row.z > 0.0 {
                         row.ds = SIGN[m] * if m < 2 { du } else { du - dp[j] };
@@ -356,7 +355,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             }
             if problem.has_soft_bound() {
                 let k = problem.soft_state;
-                let dx = self.x_new[i][k] - self.x[i][k];
+                let dx = self.dx[i][k];
                 for (side, row) in self.soft[i].iter_mut().enumerate() {
                     let dx = if side == 0 { dx } else { -dx };
                     let soften = 1.0 / (2.0 * problem.soft);
@@ -418,10 +417,10 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         self.soft.iter_mut().flatten().filter(|row| row.z > 0.0).for_each(step);
         for i in 0..self.u.len() {
             for j in 0..NU {
-                self.u[i][j] += alpha * (self.u_new[i][j] - self.u[i][j]);
+                self.u[i][j] += alpha * self.du[i][j];
             }
             for k in 0..NX {
-                self.x[i][k] += alpha * (self.x_new[i][k] - self.x[i][k]);
+                self.x[i][k] += alpha * self.dx[i][k];
             }
         }
     }

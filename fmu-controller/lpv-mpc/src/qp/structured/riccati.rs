@@ -95,12 +95,14 @@ fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C]) -> [[f64; 
 }
 
 /// Minimises over the input of a stage: from the value of what follows to the policy and the value in front.
+/// The affine term of the prediction is `d` instead of the stage's own, for recursions over differences.
 ///
 /// An input that is held at a bound keeps the form of the policy: a constant, or the previous input plus a constant.
 /// Returns `None` when the curvature of a free input is not positive, which rounding can bring about.
 #[inline(always)]
 pub(super) fn step<const NX: usize, const NU: usize>(
     stage: &Stage<NX, NU>,
+    d: &[f64; NX],
     after: &Value<NX, NU>,
     r: &[f64; NU],
     hold: &[Hold; NU],
@@ -120,8 +122,8 @@ pub(super) fn step<const NX: usize, const NU: usize>(
         for l in 0..NX {
             axpy(after.S[k][l], &B_rows[l], &mut M[k]);
         }
-        axpy(stage.d[k], &after.S[k], &mut Sd);
-        axpy(stage.d[k], &after.T[k], &mut Td);
+        axpy(d[k], &after.S[k], &mut Sd);
+        axpy(d[k], &after.T[k], &mut Td);
     }
     // G = M' A by columns, H = B' M + T' B + U + R.
     let mut G = [[0.0; NU]; NX];

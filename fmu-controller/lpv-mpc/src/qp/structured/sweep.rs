@@ -36,7 +36,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 (hold[j], demand[j]) = active::hold(problem, j, self.active[i][j], demand[j]);
             }
             let mut before = Value::ZERO;
-            if riccati::step(&problem.stages[i], &value, r, &hold, &mut self.policies[i], &mut before).is_none() {
+            let stage = &problem.stages[i];
+            if riccati::step(stage, &stage.d.data.0[0], &value, r, &hold, &mut self.policies[i], &mut before).is_none()
+            {
                 return false;
             }
             value = before;
@@ -63,10 +65,8 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 if at.level != 0
                     && let Some(end) = corner[j].take()
                 {
-                    // A level at both ends: one of the block's rows is implied by the others. The corner takes as much as
-                    // its sign allows of what the beginning cannot hold.
-                    let side = f64::from(self.active[end][j].level);
-                    let theta = if at.level == self.active[end][j].level { 0.0 } else { side * (side * mu).max(0.0) };
+                    let beginning = (at.rate == 0).then_some((at.level, mu));
+                    let theta = self.share(solution, j, (i + 1, end), beginning);
                     self.settle(solution, j, (i + 1, end), theta, scale[j], &mut released);
                     mu -= theta;
                 }
@@ -78,8 +78,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                     }
                     if let Some(end) = corner[j] {
                         if i == 0 {
-                            // The block hangs on the input applied before, which implies its corner.
-                            self.settle(solution, j, (i, end), 0.0, scale[j], &mut released);
+                            // The block hangs on the input applied before.
+                            let theta = self.share(solution, j, (i, end), None);
+                            self.settle(solution, j, (i, end), theta, scale[j], &mut released);
                         }
                     } else if self.check(i, j, at.rate, mu / scale[j], Active::NONE, &mut released) {
                         mu_next[j] = 0.0;
@@ -100,6 +101,24 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             }
         }
         released
+    }
+
+    /// What the level at the end of a block should take when the block is fixed at its beginning as well, by a level with its
+    /// side and multiplier or by the input applied before. One row is then implied by the others and the multipliers can be
+    /// shared in many ways; wanted is one in which all signs are right.
+    fn share(
+        &self,
+        solution: &Solution<NX, NU>,
+        j: usize,
+        (first, corner): (usize, usize),
+        beginning: Option<(i8, f64)>,
+    ) -> f64 {
+        let side = self.active[corner][j].level;
+        let sign = f64::from(side);
+        // Every row of the block's own side bounds the share from above, every other one from below.
+        let rates = (first..=corner).map(|l| (self.active[l][j].rate, solution.mu_du[l][j]));
+        let share = rates.chain(beginning).filter(|row| row.0 != side).map(|row| sign * row.1).fold(0.0, f64::max);
+        sign * share
     }
 
     /// Shares the multipliers of a block that ends in a corner between the corner's level, which takes `theta`, and the

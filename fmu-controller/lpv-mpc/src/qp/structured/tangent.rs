@@ -83,7 +83,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             }
             stages[i].d = change.A * solution.x[i] + change.B * solution.u[i] + change.d;
             let mut before = Value::ZERO;
-            if riccati::step(&stages[i], &value, r, &hold, &mut policies[i], &mut before).is_none() {
+            if riccati::step(&stages[i], &stages[i].d.data.0[0], &value, r, &hold, &mut policies[i], &mut before)
+                .is_none()
+            {
                 // The same recursion succeeded when the problem was solved.
                 break;
             }
