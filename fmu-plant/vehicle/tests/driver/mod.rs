@@ -1,4 +1,5 @@
 //! A simple driver for the tests: curvature feed-forward with feedback of both errors, proportional speed.
+#![allow(dead_code, reason = "no test file uses all of it")]
 
 use vehicle::{Error, Inputs, Parameters, Road, Vehicle};
 
