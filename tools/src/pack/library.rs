@@ -64,7 +64,7 @@ fn find(messages: &str, identifier: &str) -> Option<PathBuf> {
 }
 
 /// Loads the library and asks it to instantiate with the fingerprint of the XML.
-pub fn verify(model: Model, library: &Path, interface: Interface) -> Result<()> {
+pub fn verified(model: Model, library: &Path, interface: Interface) -> Result<Fmu> {
     ensure!(
         interface.identifier == model.identifier,
         "modelDescription/{} describes {}, expected {}",
@@ -82,7 +82,7 @@ pub fn verify(model: Model, library: &Path, interface: Interface) -> Result<()> 
             model.package
         );
     }
-    Ok(())
+    Ok(fmu)
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 mod contents;
 mod documentation;
 mod library;
+mod licenses;
+mod reference;
 mod system;
 
 use std::path::PathBuf;
@@ -48,20 +50,21 @@ pub fn pack(output: &Output) -> Result<Packed> {
     let progress = output.progress("building the two libraries (a minute or two the first time)");
     let libraries = library::build(&[CONTROLLER, PLANT])?;
     progress.set_message("packing");
-    let mut archives = Vec::new();
-    for (model, library) in [CONTROLLER, PLANT].into_iter().zip(&libraries) {
-        let interface = interface_of(model)?;
-        library::verify(model, library, interface.clone())?;
-        let files = contents::of(model, &interface, &[(platform(), library.clone())])?;
-        archives.push((model, interface, files));
-    }
+    let packages = licenses::metadata()?;
+    let interfaces = [interface_of(CONTROLLER)?, interface_of(PLANT)?];
+    let [controller, plant] = &interfaces;
+    let mut controller_files = contents::of(CONTROLLER, controller, &[(platform(), libraries[0].clone())], &packages)?;
+    let mut plant_files = contents::of(PLANT, plant, &[(platform(), libraries[1].clone())], &packages)?;
+    reference::add(
+        &library::verified(PLANT, &libraries[1], plant.clone())?,
+        &library::verified(CONTROLLER, &libraries[0], controller.clone())?,
+        &mut plant_files,
+        &mut controller_files,
+    )?;
     let mut resources = Files::default();
-    for (model, _, files) in &archives {
+    for (model, files) in [(CONTROLLER, &controller_files), (PLANT, &plant_files)] {
         resources.add(&format!("resources/{}.fmu", model.name), files.to_bytes()?)?;
     }
-    let [(_, controller, controller_files), (_, plant, plant_files)] = archives.as_slice() else {
-        unreachable!("two models were packed above");
-    };
     let system = system::of(controller, plant, resources)?;
     let packed = Packed {
         controller: controller_files.save(&CONTROLLER.archive())?,
