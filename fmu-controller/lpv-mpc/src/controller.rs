@@ -5,12 +5,14 @@ use serde::{Deserialize, Serialize};
 use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
+use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, V_X, V_Y, YAW_RATE};
-use crate::mpc::{Mpc, NX_LAGS, TyreModel, vehicle_part};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y};
+use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::{Adaptation, Estimation, HORIZON_MAX};
+use crate::sensitivity::{self, Snapshot};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
 
@@ -57,6 +59,9 @@ pub struct Controller {
     /// The command that was given last.
     u_prev: Input,
     output: Output,
+    /// Samples in the last communication step, and what the last of them started from.
+    sampled: u32,
+    snapshot: Snapshot,
 }
 
 impl Controller {
@@ -98,6 +103,8 @@ impl Controller {
             samples: 0,
             u_prev: Input::zeros(),
             output: Output::initial(&tyres),
+            sampled: 0,
+            snapshot: Snapshot::new(&tyres, p.sensor_noise),
             parameters,
         })
     }
@@ -141,9 +148,11 @@ impl Controller {
         if !(h > 0.0 && h.is_finite() && t.is_finite()) {
             return Err(Error::Step(h));
         }
+        self.sampled = 0;
         let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);
         while self.start + self.samples as f64 * self.parameters.t_s < end {
             self.samples += 1;
+            self.sampled += 1;
             self.sample(t, h, inputs);
             self.latency.send(t + h, self.u_prev);
         }
@@ -153,10 +162,15 @@ impl Controller {
     /// One sample with what was measured at `t` [s]: estimate, predict over the latency, plan, take the first command.
     fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
         let (duration, delivered) = self.latency.advance(t);
+        self.snapshot.inputs.clone_from(inputs);
+        self.snapshot.estimator.clone_from(&self.estimator);
+        (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
+        self.snapshot.tyres[0] = *self.beliefs.tyres.present();
         let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
         tyres.observe(&x, &delivered);
+        self.snapshot.tyres[1] = *tyres.present();
         let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, tyres.present(), &disturbance);
         let reference = inputs.reference((h + p.input_delay) / p.t_s);
         let u_prev = self.u_prev;
@@ -172,6 +186,29 @@ impl Controller {
         });
         self.u_prev = command;
         self.publish(status);
+    }
+
+    /// Derivative of the output along a `direction` of the inputs that were held during the last communication step.
+    ///
+    /// The result is an [`Output`] whose quantities are derivatives; status, iterations, stiffnesses and residual have none
+    /// and are zero. The command and plan of a step in which no sample was taken, or no new plan was found, do not depend
+    /// on its inputs: all derivatives are zero. Where an infinitesimal change alters the active set the derivative of the side
+    /// on which the solver ended is returned; tyres that the network gave are held.
+    ///
+    /// # Errors
+    /// [`Error::NoDerivative`] when the plan is not an exact optimum, is the first one (it finds its own schedule in several
+    /// passes), or when several samples followed each other in the step.
+    pub fn along(&self, direction: &Inputs) -> Result<Output, Error> {
+        if self.sampled == 0 || self.output.status >= Status::PreviousPlan {
+            return Ok(Output::initial(&Tyres::secant(0.0, 0.0)));
+        }
+        if self.sampled > 1 {
+            return Err(Error::NoDerivative("several samples were taken in one step"));
+        }
+        let Self { parameters, beliefs: Beliefs { body, tyres }, latency, snapshot, .. } = self;
+        let given = (parameters, body, tyres.nominal(), latency);
+        with_mpc!(&self.core, mpc => sensitivity::along(mpc, snapshot, direction, given))
+            .ok_or(Error::NoDerivative("the plan is the first one or not an exact optimum"))
     }
 
     /// State and disturbance at the measurement, and whether all of it was measured.
@@ -201,15 +238,7 @@ impl Controller {
             (output.iterations, output.kkt_residual, output.slack_e_y) = mpc.diagnostics();
             let last = mpc.plan.u.len() - 1;
             for i in 0..HORIZON_MAX {
-                let x = vehicle_part(&mpc.plan.x[i.min(last) + 1]);
-                let u = &mpc.plan.u[i.min(last)];
-                output.e_y_pred[i] = x[E_Y];
-                output.e_psi_pred[i] = x[E_PSI];
-                output.v_x_pred[i] = x[V_X];
-                output.v_y_pred[i] = x[V_Y];
-                output.yaw_rate_pred[i] = x[YAW_RATE];
-                output.delta_pred[i] = u[DELTA];
-                output.a_x_pred[i] = u[A_X];
+                output.set_stage(i, &vehicle_part(&mpc.plan.x[i.min(last) + 1]), &mpc.plan.u[i.min(last)]);
             }
         });
     }

@@ -6,6 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::Scalar;
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Lpv, NU, NX, State, V_X, V_Y, YAW_RATE};
 
 /// Largest `step * rate` for one evaluation of the series [1]: its error there is 1.5^5 / 5! = 6 % of a mode that has
@@ -74,19 +75,19 @@ fn moment_ratios(step: f64, tau: f64) -> [f64; ORDER] {
 
 /// One sample: `x+ = Phi x + Gamma u + Lag (a - u) + d`, where `a` is what the actuators deliver at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Discrete {
+pub struct Discrete<T = f64> {
     /// State transition.
-    pub Phi: SMatrix<f64, NX, NX>,
+    pub Phi: SMatrix<T, NX, NX>,
     /// Response to commands held over the sample, as if there were no lags.
-    pub Gamma: SMatrix<f64, NX, NU>,
+    pub Gamma: SMatrix<T, NX, NU>,
     /// Response to the decaying distance between actuator and command.
-    pub Lag: SMatrix<f64, NX, NU>,
+    pub Lag: SMatrix<T, NX, NU>,
     /// Response to the affine term.
-    pub d: State,
+    pub d: State<T>,
 }
 
 /// `A z`, with the zeros of the embedding left out.
-fn times(A: &SMatrix<f64, NX, NX>, z: &State) -> State {
+fn times<T: Scalar>(A: &SMatrix<T, NX, NX>, z: &State<T>) -> State<T> {
     State::from([
         A[(V_X, V_X)] * z[V_X] + A[(V_X, V_Y)] * z[V_Y] + A[(V_X, YAW_RATE)] * z[YAW_RATE],
         A[(V_Y, V_Y)] * z[V_Y] + A[(V_Y, YAW_RATE)] * z[YAW_RATE],
@@ -97,19 +98,19 @@ fn times(A: &SMatrix<f64, NX, NX>, z: &State) -> State {
 }
 
 /// `w_0 (I + w_1 A (I + w_2 A (I + w_3 A))) e_j`.
-fn series(A: &SMatrix<f64, NX, NX>, column: usize, weights: &[f64; ORDER]) -> State {
+fn series<T: Scalar>(A: &SMatrix<T, NX, NX>, column: usize, weights: &[f64; ORDER]) -> State<T> {
     let mut z = State::zeros();
-    z[column] = 1.0;
+    z[column] = T::one();
     for k in (1..ORDER).rev() {
-        z = times(A, &z) * weights[k];
-        z[column] += 1.0;
+        z = times(A, &z) * T::from(weights[k]);
+        z[column] += T::one();
     }
-    z * weights[0]
+    z * T::from(weights[0])
 }
 
 /// Discretises the system over a hold.
-pub fn discretise(lpv: &Lpv, hold: &Hold) -> Discrete {
-    let rate = lpv.A[(V_Y, V_Y)].abs().max(lpv.A[(YAW_RATE, YAW_RATE)].abs());
+pub fn discretise<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
+    let rate = lpv.A[(V_Y, V_Y)].re().abs().max(lpv.A[(YAW_RATE, YAW_RATE)].re().abs());
     let stiffness = hold.step * rate;
     if stiffness <= STIFFNESS_MAX {
         return one_piece(lpv, hold);
@@ -120,14 +121,14 @@ pub fn discretise(lpv: &Lpv, hold: &Hold) -> Discrete {
 }
 
 /// The series over the whole hold.
-fn one_piece(lpv: &Lpv, hold: &Hold) -> Discrete {
+fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let Lpv { A, B, d } = lpv;
     let h = hold.step;
     // Columns of the integral of the exponential: everything the inputs and the affine term excite lies in their span.
     let weights = [h, h / 2.0, h / 3.0, h / 4.0];
     let Psi = [V_X, V_Y, YAW_RATE].map(|j| series(A, j, &weights));
 
-    let mut Phi = SMatrix::<f64, NX, NX>::identity();
+    let mut Phi = SMatrix::<T, NX, NX>::identity();
     for (j, column) in Psi.iter().enumerate() {
         let moved = times(A, column);
         for i in 0..NX {
@@ -135,11 +136,11 @@ fn one_piece(lpv: &Lpv, hold: &Hold) -> Discrete {
         }
     }
     // The columns of e_y and e_psi are exact after one term.
-    Phi[(E_Y, E_PSI)] = h * A[(E_Y, E_PSI)];
+    Phi[(E_Y, E_PSI)] = A[(E_Y, E_PSI)] * h;
 
-    let combine = |columns: &[State; 3], b: [f64; 3]| columns[0] * b[0] + columns[1] * b[1] + columns[2] * b[2];
+    let combine = |columns: &[State<T>; 3], b: [T; 3]| columns[0] * b[0] + columns[1] * b[1] + columns[2] * b[2];
     let b_delta = [B[(V_X, DELTA)], B[(V_Y, DELTA)], B[(YAW_RATE, DELTA)]];
-    let mut Lag = SMatrix::<f64, NX, NU>::zeros();
+    let mut Lag = SMatrix::<T, NX, NU>::zeros();
     if hold.tau[DELTA] > 0.0 {
         let columns = [V_X, V_Y, YAW_RATE].map(|j| series(A, j, &hold.moments[DELTA]));
         Lag.set_column(DELTA, &combine(&columns, b_delta));
@@ -156,11 +157,11 @@ fn one_piece(lpv: &Lpv, hold: &Hold) -> Discrete {
 }
 
 /// The hold cut into equal pieces and put together again, for modes too fast for the series.
-fn compose(lpv: &Lpv, hold: &Hold, pieces: u32) -> Discrete {
+fn compose<T: Scalar>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) -> Discrete<T> {
     let short = Hold::new(hold.step / f64::from(pieces), hold.tau);
     let piece = one_piece(lpv, &short);
-    let decay = SMatrix::<f64, NU, NU>::from_diagonal(&SVector::from(short.decay));
-    let mut left = SMatrix::<f64, NU, NU>::identity();
+    let decay = SMatrix::<T, NU, NU>::from_diagonal(&SVector::from(short.decay.map(T::from)));
+    let mut left = SMatrix::<T, NU, NU>::identity();
     let mut whole =
         Discrete { Phi: SMatrix::identity(), Gamma: SMatrix::zeros(), Lag: SMatrix::zeros(), d: State::zeros() };
     for _ in 0..pieces {

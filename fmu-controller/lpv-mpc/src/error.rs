@@ -18,6 +18,9 @@ pub enum Error {
     /// Adaptation by a network without one.
     #[error("adaptation by a network needs a network file")]
     NoNetwork,
+    /// The output cannot be differentiated now.
+    #[error("no derivative: {0}")]
+    NoDerivative(&'static str),
     /// A communication step that no controller can take.
     #[error("communication step must be positive and finite, got {0} s")]
     Step(f64),

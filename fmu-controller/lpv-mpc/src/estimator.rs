@@ -6,8 +6,10 @@
 //! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on.
 
 use nalgebra::{SMatrix, SVector};
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
+use crate::Scalar;
 use crate::discretise::{Hold, discretise};
 use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
 
@@ -33,28 +35,28 @@ const INITIAL: [f64; 3] = [1.0, 1.0, 0.5];
 
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Estimator {
+pub struct Estimator<T: Scalar = f64> {
     /// Estimated state.
-    pub x: State,
+    pub x: State<T>,
     /// Estimated disturbance.
-    pub disturbance: Disturbance,
-    P: SMatrix<f64, NZ, NZ>,
+    pub disturbance: Disturbance<T>,
+    P: SMatrix<T, NZ, NZ>,
     /// Curvature at the last update [1/m].
-    kappa: f64,
+    kappa: T,
     /// Whether a measurement has been seen to start from.
     started: bool,
     /// Standard deviations of the sensors in units of [`SENSOR_DEVIATION`].
     sensor_noise: f64,
 }
 
-impl Estimator {
+impl<T: Scalar> Estimator<T> {
     /// Nothing known yet; `sensor_noise` is in units of [`SENSOR_DEVIATION`].
     pub fn new(sensor_noise: f64) -> Self {
         Self {
             x: State::zeros(),
             disturbance: Disturbance::zeros(),
             P: SMatrix::zeros(),
-            kappa: 0.0,
+            kappa: T::zero(),
             started: false,
             sensor_noise,
         }
@@ -66,25 +68,40 @@ impl Estimator {
     /// every value was used.
     pub fn update(
         &mut self,
-        measured: &State,
-        kappa: f64,
+        measured: &State<T>,
+        kappa: T,
         input: &Input,
         duration: f64,
         body: &Body,
         tyres: &Tyres,
     ) -> bool {
-        let complete = measured.iter().all(|z| z.is_finite());
-        let kappa = if kappa.is_finite() { kappa } else { self.kappa };
+        let complete = measured.iter().all(|z| z.re().is_finite());
+        let kappa = if kappa.re().is_finite() { kappa } else { self.kappa };
         if !self.started {
             self.start(measured);
         } else if duration > 0.0 {
-            self.predict(0.5 * (self.kappa + kappa), input, duration, body, tyres);
+            self.predict((self.kappa + kappa) * 0.5, input, duration, body, tyres);
         }
         self.kappa = kappa;
-        for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.is_finite()) {
+        for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.re().is_finite()) {
             self.correct(i, *z);
         }
         complete
+    }
+
+    /// The same filter on dual numbers, every derivative zero.
+    pub(crate) fn to_dual(&self) -> Estimator<Dual64>
+    where
+        T: Into<Dual64>,
+    {
+        Estimator {
+            x: self.x.map(Into::into),
+            disturbance: self.disturbance.map(Into::into),
+            P: self.P.map(Into::into),
+            kappa: self.kappa.into(),
+            started: self.started,
+            sensor_noise: self.sensor_noise,
+        }
     }
 
     /// Whether there is an estimate at all.
@@ -93,35 +110,35 @@ impl Estimator {
     }
 
     /// Takes the first measurement as it is; a lateral velocity that is not measured starts at zero.
-    fn start(&mut self, measured: &State) {
-        let known = [V_X, YAW_RATE, E_Y, E_PSI].iter().all(|i| measured[*i].is_finite());
+    fn start(&mut self, measured: &State<T>) {
+        let known = [V_X, YAW_RATE, E_Y, E_PSI].iter().all(|i| measured[*i].re().is_finite());
         if !known {
             return;
         }
         self.started = true;
-        self.x = measured.map(|z| if z.is_finite() { z } else { 0.0 });
+        self.x = measured.map(|z| if z.re().is_finite() { z } else { T::zero() });
         let mut deviation = SVector::<f64, NZ>::zeros();
         for i in 0..NX {
-            deviation[i] = if measured[i].is_finite() { self.deviation(i) } else { 1.0 };
+            deviation[i] = if measured[i].re().is_finite() { self.deviation(i) } else { 1.0 };
         }
         deviation.fixed_rows_mut::<3>(NX).copy_from(&SVector::from(INITIAL));
-        self.P = SMatrix::from_diagonal(&deviation.component_mul(&deviation));
+        self.P = SMatrix::from_diagonal(&deviation.map(|deviation| T::from(deviation * deviation)));
     }
 
     fn deviation(&self, i: usize) -> f64 {
         SENSOR_DEVIATION[i] * self.sensor_noise
     }
 
-    fn predict(&mut self, kappa: f64, input: &Input, duration: f64, body: &Body, tyres: &Tyres) {
+    fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres) {
         let hold = Hold::new(duration, [0.0, 0.0]);
-        let sample = |x: &State| discretise(&embed(x, input, kappa, body, tyres, &self.disturbance), &hold);
-        let move_on = |x: &State| {
-            let at = sample(x);
+        let input = input.map(T::from);
+        let move_on = |x: &State<T>| {
+            let at = discretise(&embed(x, &input, kappa, body, tyres, &self.disturbance), &hold);
             (at.Phi * self.x + at.Gamma * input + at.d, at)
         };
         // Scheduled in the middle of the step, as the stages of the plan are.
         let (end, _) = move_on(&self.x);
-        let (x, at) = move_on(&((self.x + end) * 0.5));
+        let (x, at) = move_on(&((self.x + end) * T::from(0.5)));
 
         // P <- F P F', once from the left and, since P stays symmetric, once more from the left on the transpose.
         for _ in 0..2 {
@@ -137,21 +154,21 @@ impl Estimator {
             self.P.transpose_mut();
         }
         for i in 0..NX {
-            self.P[(i, i)] += MODEL[i] * MODEL[i] * duration;
+            self.P[(i, i)] += T::from(MODEL[i] * MODEL[i] * duration);
         }
         for j in 0..3 {
-            self.P[(NX + j, NX + j)] += WALK[j] * WALK[j] * duration;
+            self.P[(NX + j, NX + j)] += T::from(WALK[j] * WALK[j] * duration);
         }
         self.x = x;
     }
 
     /// One measured state; the covariance stays symmetric because its column and row are the same numbers.
-    fn correct(&mut self, i: usize, z: f64) {
+    fn correct(&mut self, i: usize, z: T) {
         if !self.started {
             return;
         }
         let column = self.P.column(i).into_owned();
-        let gain = column / (column[i] + self.deviation(i) * self.deviation(i));
+        let gain = column * (column[i] + self.deviation(i) * self.deviation(i)).recip();
         let innovation = z - self.x[i];
         for k in 0..NX {
             self.x[k] += gain[k] * innovation;
@@ -167,13 +184,13 @@ impl Estimator {
 ///
 /// An acceleration held over the step adds up to first order in the velocities and to second order in the errors on the
 /// path; it is a random walk, so more would pretend to know it better.
-fn move_column(x: &State, d: &SVector<f64, 3>, Phi: &SMatrix<f64, NX, NX>, duration: f64) -> State {
+fn move_column<T: Scalar>(x: &State<T>, d: &SVector<T, 3>, Phi: &SMatrix<T, NX, NX>, duration: f64) -> State<T> {
     let mut moved = Phi * x;
     for j in 0..3 {
-        moved[j] += duration * d[j];
+        moved[j] += d[j] * duration;
     }
     let half_square = 0.5 * duration * duration;
-    moved[E_Y] += half_square * d[V_Y];
-    moved[E_PSI] += half_square * d[YAW_RATE];
+    moved[E_Y] += d[V_Y] * half_square;
+    moved[E_PSI] += d[YAW_RATE] * half_square;
     moved
 }

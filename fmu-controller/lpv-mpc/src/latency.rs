@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::Scalar;
 use crate::model::{A_X, Body, DELTA, Disturbance, Input, NU, State, Tyres, V_X, derivative, fastest_rate};
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
@@ -32,9 +33,9 @@ pub struct Latency {
 
 /// A predicted state with what the actuators deliver then.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Predicted {
+pub struct Predicted<T = f64> {
     /// Vehicle state.
-    pub x: State,
+    pub x: State<T>,
     /// Actual steering angle [rad] and acceleration [m/s2].
     pub actual: Input,
 }
@@ -103,17 +104,17 @@ impl Latency {
     /// Moves the state `x` at the time of the last [`advance`](Self::advance) on by `step` [s] and the delay.
     ///
     /// `kappa` gives the curvature [1/m] at a time after the measurement [s].
-    pub fn predict(
+    pub fn predict<T: Scalar>(
         &self,
-        x: &State,
+        x: &State<T>,
         step: f64,
-        kappa: impl Fn(f64) -> f64,
+        kappa: impl Fn(f64) -> T,
         body: &Body,
         tyres: &Tyres,
-        disturbance: &Disturbance,
-    ) -> Predicted {
+        disturbance: &Disturbance<T>,
+    ) -> Predicted<T> {
         let end = self.time + step + self.delay;
-        let rate = fastest_rate(x[V_X], body, tyres);
+        let rate = fastest_rate(x[V_X].re(), body, tyres);
         let mut at = Predicted { x: *x, actual: self.actual };
         let mut now = self.time;
         while now < end - SAME_TIME {
@@ -124,7 +125,10 @@ impl Latency {
             let mut done = 0.0;
             while done < steps {
                 let t = now - self.time + done * h;
-                at = self.runge_kutta(&at, &command, h, |s| kappa(t + s), body, tyres, disturbance);
+                let f = |x: &State<T>, u: &Input, s: f64| {
+                    derivative(x, &u.map(T::from), kappa(t + s), body, tyres, disturbance)
+                };
+                at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;
             }
             now += piece;
@@ -132,28 +136,24 @@ impl Latency {
         at
     }
 
-    /// One classic Runge-Kutta step of the nonlinear model behind the lags.
-    #[expect(clippy::too_many_arguments, reason = "the model's arguments, a command and a step")]
-    fn runge_kutta(
+    /// One classic Runge-Kutta step of `x' = f(x, u, s)` behind the lags.
+    fn runge_kutta<T: Scalar>(
         &self,
-        at: &Predicted,
+        at: &Predicted<T>,
         command: &Input,
         h: f64,
-        kappa: impl Fn(f64) -> f64,
-        body: &Body,
-        tyres: &Tyres,
-        disturbance: &Disturbance,
-    ) -> Predicted {
+        f: impl Fn(&State<T>, &Input, f64) -> State<T>,
+    ) -> Predicted<T> {
         let middle = lag(&at.actual, command, h / 2.0, &self.tau);
         let end = lag(&at.actual, command, h, &self.tau);
         // Without a lag the command acts from the first moment on.
         let start = lag(&at.actual, command, 0.0, &self.tau);
-        let f = |x: &State, u: &Input, s: f64| derivative(x, u, kappa(s), body, tyres, disturbance);
+        let half = T::from(h / 2.0);
         let k1 = f(&at.x, &start, 0.0);
-        let k2 = f(&(at.x + k1 * (h / 2.0)), &middle, h / 2.0);
-        let k3 = f(&(at.x + k2 * (h / 2.0)), &middle, h / 2.0);
-        let k4 = f(&(at.x + k3 * h), &end, h);
-        Predicted { x: at.x + (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0), actual: end }
+        let k2 = f(&(at.x + k1 * half), &middle, h / 2.0);
+        let k3 = f(&(at.x + k2 * half), &middle, h / 2.0);
+        let k4 = f(&(at.x + k3 * T::from(h)), &end, h);
+        Predicted { x: at.x + (k1 + (k2 + k3) * T::from(2.0) + k4) * T::from(h / 6.0), actual: end }
     }
 }
 

@@ -7,6 +7,8 @@
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+use crate::Scalar;
+
 /// Number of vehicle states.
 pub const NX: usize = 5;
 /// Number of inputs.
@@ -28,9 +30,9 @@ pub const DELTA: usize = 0;
 pub const A_X: usize = 1;
 
 /// State `[v_x, v_y, yaw_rate, e_y, e_psi]`.
-pub type State = SVector<f64, NX>;
+pub type State<T = f64> = SVector<T, NX>;
 /// Input `[delta, a_x]`.
-pub type Input = SVector<f64, NU>;
+pub type Input<T = f64> = SVector<T, NU>;
 
 /// Speed below which slip angles are taken as if the car moved this fast [m/s].
 ///
@@ -81,69 +83,76 @@ impl Tyres {
 }
 
 /// Accelerations that the model cannot explain: `[m/s2, m/s2, rad/s2]` on `v_x`, `v_y` and `yaw_rate`.
-pub type Disturbance = SVector<f64, 3>;
+pub type Disturbance<T = f64> = SVector<T, 3>;
 
 /// The linear system `x' = A x + B u + d` at one scheduling point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lpv {
+pub struct Lpv<T = f64> {
     /// System matrix.
-    pub A: SMatrix<f64, NX, NX>,
+    pub A: SMatrix<T, NX, NX>,
     /// Input matrix.
-    pub B: SMatrix<f64, NX, NU>,
+    pub B: SMatrix<T, NX, NU>,
     /// Affine term: forces at zero slip and disturbances.
-    pub d: State,
+    pub d: State<T>,
 }
 
 /// Guarded speed of the slip angles, and the ratio of true to guarded speed that scales the steering.
-fn guarded(v_x: f64) -> (f64, f64) {
-    let v = v_x.max(V_GUARD);
+fn guarded<T: Scalar>(v_x: T) -> (T, T) {
+    let v = v_x.larger(V_GUARD);
     (v, v_x / v)
 }
 
 /// `1 - kappa e_y`, held away from zero.
-fn path_factor(kappa: f64, e_y: f64) -> f64 {
-    (1.0 - kappa * e_y).max(PATH_FACTOR_MIN)
+fn path_factor<T: Scalar>(kappa: T, e_y: T) -> T {
+    (-kappa * e_y + 1.0).larger(PATH_FACTOR_MIN)
 }
 
 /// Front and rear slip angles [rad], [Kebbati, eq. (2)] with the signs of the yaw terms corrected.
-pub fn slip_angles(x: &State, delta: f64, body: &Body) -> (f64, f64) {
+pub fn slip_angles<T: Scalar>(x: &State<T>, delta: T, body: &Body) -> (T, T) {
     let (v, ratio) = guarded(x[V_X]);
-    (delta * ratio - ((x[V_Y] + body.l_f * x[YAW_RATE]) / v).atan(), -((x[V_Y] - body.l_r * x[YAW_RATE]) / v).atan())
+    (delta * ratio - ((x[V_Y] + x[YAW_RATE] * body.l_f) / v).atan(), -((x[V_Y] - x[YAW_RATE] * body.l_r) / v).atan())
 }
 
 /// Right-hand side of the prediction model, [Kebbati, eq. (1)] corrected.
 ///
 /// Differs from the printed equations in the signs of the slip angles, the factor `kappa` and the signs in `e_psi'`, and
 /// rolling resistance that is `c_rr m g` instead of the tyre's friction times the weight.
-pub fn derivative(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, disturbance: &Disturbance) -> State {
+pub fn derivative<T: Scalar>(
+    x: &State<T>,
+    u: &Input<T>,
+    kappa: T,
+    body: &Body,
+    tyres: &Tyres,
+    disturbance: &Disturbance<T>,
+) -> State<T> {
     let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
-    let (v, _) = guarded(v_x);
+    let (_, ratio) = guarded(v_x);
     let (alpha_f, alpha_r) = slip_angles(x, u[DELTA], body);
-    let f_yf = tyres.f_f0 + tyres.c_f * alpha_f;
-    let f_yr = tyres.f_r0 + tyres.c_r * alpha_r;
+    let f_yf = alpha_f * tyres.c_f + tyres.f_f0;
+    let f_yr = alpha_r * tyres.c_r + tyres.f_r0;
     let (s, c) = u[DELTA].sin_cos();
     let (s_psi, c_psi) = e_psi.sin_cos();
 
     State::from([
-        u[A_X] + yaw_rate * v_y - f_yf * s / m - rolling * v_x / v - drag * v_x.abs() * v_x / m + disturbance[0],
+        u[A_X] + yaw_rate * v_y - f_yf * s / m - ratio * rolling - v_x.abs() * v_x * drag / m + disturbance[0],
         (f_yf * c + f_yr) / m - yaw_rate * v_x + disturbance[1],
-        (l_f * f_yf * c - l_r * f_yr) / i_z + disturbance[2],
+        (f_yf * c * l_f - f_yr * l_r) / i_z + disturbance[2],
         v_x * s_psi + v_y * c_psi,
         yaw_rate - kappa * (v_x * c_psi - v_y * s_psi) / path_factor(kappa, e_y),
     ])
 }
 
 /// `atan(z) / z`, 1 at zero.
-fn atan_ratio(z: f64) -> f64 {
+fn atan_ratio<T: Scalar>(z: T) -> T {
     // Below 1e-4 the first neglected term of the series, z^4 / 5, is under the rounding of 1.
-    if z.abs() < 1e-4 { 1.0 - z * z / 3.0 } else { z.atan() / z }
+    if z.re().abs() < 1e-4 { -z * z / 3.0 + 1.0 } else { z.atan() / z }
 }
 
 /// `sin(x) / x` from the sine of `x`, 1 at zero.
-fn sinc(x: f64, sin_x: f64) -> f64 {
+fn sinc<T: Scalar>(x: T, sin_x: T) -> T {
     // Below 1e-4 the first neglected term of the series, x^4 / 120, is under the rounding of 1.
-    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { sin_x / x }
+    if x.re().abs() < 1e-4 { -x * x / 6.0 + 1.0 } else { sin_x / x }
 }
 
 /// The LPV embedding at the scheduling point `(x, u, kappa)`, [Kebbati, eqs. (6) to (8)] corrected.
@@ -151,7 +160,14 @@ fn sinc(x: f64, sin_x: f64) -> f64 {
 /// Exact: `A x + B u + d` at the scheduling point equals [`derivative`]. Differs from the printed matrices in the signs of
 /// `A52`, `B21`, `B31` and of the rear term in `A32`, in the misplaced cosines of `A32` and `A33`, and in the lateral
 /// error's row: the printed `A41 = sin e_psi` with `A45 = 0` makes (A, B) uncontrollable, `A45 = v_x sinc e_psi` does not.
-pub fn embed(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, disturbance: &Disturbance) -> Lpv {
+pub fn embed<T: Scalar>(
+    x: &State<T>,
+    u: &Input<T>,
+    kappa: T,
+    body: &Body,
+    tyres: &Tyres,
+    disturbance: &Disturbance<T>,
+) -> Lpv<T> {
     let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
     let Tyres { c_f, c_r, f_f0, f_r0 } = *tyres;
@@ -159,36 +175,37 @@ pub fn embed(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, distu
     let (s, c) = u[DELTA].sin_cos();
     let (s_psi, c_psi) = e_psi.sin_cos();
     // Stiffness per metre per second of lateral velocity at the axle.
-    let k_f = c_f * atan_ratio((v_y + l_f * yaw_rate) / v) / v;
-    let k_r = c_r * atan_ratio((v_y - l_r * yaw_rate) / v) / v;
+    let per_v = v.recip();
+    let k_f = atan_ratio((v_y + yaw_rate * l_f) * per_v) * per_v * c_f;
+    let k_r = atan_ratio((v_y - yaw_rate * l_r) * per_v) * per_v * c_r;
     let k_path = kappa / path_factor(kappa, e_y);
 
-    let mut A = SMatrix::<f64, NX, NX>::zeros();
-    A[(V_X, V_X)] = -rolling / v - drag * v_x.abs() / m;
+    let mut A = SMatrix::<T, NX, NX>::zeros();
+    A[(V_X, V_X)] = -per_v * rolling - v_x.abs() * (drag / m);
     A[(V_X, V_Y)] = k_f * s / m;
-    A[(V_X, YAW_RATE)] = k_f * l_f * s / m + v_y;
+    A[(V_X, YAW_RATE)] = k_f * s * (l_f / m) + v_y;
     A[(V_Y, V_Y)] = -(k_f * c + k_r) / m;
-    A[(V_Y, YAW_RATE)] = -(k_f * l_f * c - k_r * l_r) / m - v_x;
-    A[(YAW_RATE, V_Y)] = -(k_f * l_f * c - k_r * l_r) / i_z;
-    A[(YAW_RATE, YAW_RATE)] = -(k_f * l_f * l_f * c + k_r * l_r * l_r) / i_z;
+    A[(V_Y, YAW_RATE)] = -(k_f * c * l_f - k_r * l_r) / m - v_x;
+    A[(YAW_RATE, V_Y)] = -(k_f * c * l_f - k_r * l_r) / i_z;
+    A[(YAW_RATE, YAW_RATE)] = -(k_f * c * (l_f * l_f) + k_r * (l_r * l_r)) / i_z;
     A[(E_Y, V_Y)] = c_psi;
     A[(E_Y, E_PSI)] = v_x * sinc(e_psi, s_psi);
     A[(E_PSI, V_X)] = -k_path * c_psi;
     A[(E_PSI, V_Y)] = k_path * s_psi;
-    A[(E_PSI, YAW_RATE)] = 1.0;
+    A[(E_PSI, YAW_RATE)] = T::one();
 
-    let mut B = SMatrix::<f64, NX, NU>::zeros();
-    B[(V_X, DELTA)] = -c_f * ratio * s / m;
-    B[(V_X, A_X)] = 1.0;
-    B[(V_Y, DELTA)] = c_f * ratio * c / m;
-    B[(YAW_RATE, DELTA)] = c_f * ratio * l_f * c / i_z;
+    let mut B = SMatrix::<T, NX, NU>::zeros();
+    B[(V_X, DELTA)] = -ratio * s * (c_f / m);
+    B[(V_X, A_X)] = T::one();
+    B[(V_Y, DELTA)] = ratio * c * (c_f / m);
+    B[(YAW_RATE, DELTA)] = ratio * c * (c_f * l_f / i_z);
 
     let d = State::from([
-        -f_f0 * s / m + disturbance[0],
-        (f_f0 * c + f_r0) / m + disturbance[1],
-        (l_f * f_f0 * c - l_r * f_r0) / i_z + disturbance[2],
-        0.0,
-        0.0,
+        -s * (f_f0 / m) + disturbance[0],
+        (c * f_f0 + f_r0) / m + disturbance[1],
+        (c * (f_f0 * l_f) - f_r0 * l_r) / i_z + disturbance[2],
+        T::zero(),
+        T::zero(),
     ]);
     Lpv { A, B, d }
 }
@@ -197,14 +214,13 @@ pub fn embed(x: &State, u: &Input, kappa: f64, body: &Body, tyres: &Tyres, distu
 pub fn fastest_rate(v_x: f64, body: &Body, tyres: &Tyres) -> f64 {
     let Body { m, i_z, l_f, l_r, .. } = *body;
     let (c_f, c_r) = (tyres.c_f.abs(), tyres.c_r.abs());
-    let (v, _) = guarded(v_x);
-    ((c_f + c_r) / m).max((c_f * l_f * l_f + c_r * l_r * l_r) / i_z) / v
+    ((c_f + c_r) / m).max((c_f * l_f * l_f + c_r * l_r * l_r) / i_z) / v_x.max(V_GUARD)
 }
 
 /// Lateral velocity [m/s] in steady cornering at speed `v_x` [m/s] on curvature `kappa` [1/m], [Rajamani, section 3.3].
-pub fn steady_lateral_velocity(v_x: f64, kappa: f64, body: &Body, tyres: &Tyres) -> f64 {
+pub fn steady_lateral_velocity<T: Scalar>(v_x: T, kappa: T, body: &Body, tyres: &Tyres) -> T {
     let Body { m, l_f, l_r, .. } = *body;
-    kappa * v_x * (l_r - m * l_f * v_x * v_x / (tyres.c_r * (l_f + l_r)))
+    kappa * v_x * (-v_x * v_x * (m * l_f / (tyres.c_r * (l_f + l_r))) + l_r)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The predictive controller of one sample: schedule, model, quadratic programme, plan.
 //!
-//! The scheduling trajectory is the previous plan moved on by one sample; each stage is linearised in the middle between its
-//! two nodes, which makes the frozen system a second-order approximation of the varying one at no cost. `N_X` is 5 for ideal
+//! The scheduling trajectory is the previous plan moved on by one sample. `N_X` is 5 for ideal
 //! actuators and 7 when the actual steering angle and acceleration are states behind first-order lags; the inputs are the
 //! commands in both cases.
 
@@ -9,17 +8,12 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
-use crate::discretise::{Discrete, Hold, discretise};
+use crate::discretise::Hold;
+use crate::horizon::{NX_LAGS, Path, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{
-    A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed,
-    steady_lateral_velocity,
-};
+use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::parameters::{Backend, HORIZON_MAX};
-use crate::qp::{Clarabel, Outcome, Problem, Solution, Stage, Structured};
-
-/// Number of states with the actuators' lags.
-pub const NX_LAGS: usize = NX + NU;
+use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
 /// change: the third changes the first command by less than 1e-3 of its bound.
@@ -97,15 +91,28 @@ impl<const N_X: usize> Plan<N_X> {
 /// Model predictive controller over states of dimension `N_X`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mpc<const N_X: usize> {
-    problem: Problem<N_X, NU>,
-    solution: Solution<N_X, NU>,
-    structured: Structured<N_X, NU>,
+    pub(crate) problem: Problem<N_X, NU>,
+    pub(crate) solution: Solution<N_X, NU>,
+    pub(crate) structured: Structured<N_X, NU>,
     /// Holds nothing that could change an answer, so it is no part of a saved state.
     #[serde(skip, default = "clarabel")]
     clarabel: Clarabel<N_X, NU>,
     backend: Backend,
     /// The plan that is executed.
     pub plan: Plan<N_X>,
+    /// Trajectory around which the last problem was linearised, and the tyres of its stages.
+    pub(crate) schedule: Plan<N_X>,
+    pub(crate) tyres: Vec<Tyres>, // N
+    /// Whether the last answer is the structured solver's to a problem that followed from one schedule: then it can be
+    /// differentiated.
+    pub(crate) smooth: bool,
+}
+
+impl Reference {
+    /// The path under stage `i`.
+    pub fn stage(&self, i: usize) -> Path<f64> {
+        Path { kappa: [self.kappa[i], self.kappa[i + 1]], v_x: self.v_x[i + 1] }
+    }
 }
 
 impl<const N_X: usize> Mpc<N_X> {
@@ -119,6 +126,9 @@ impl<const N_X: usize> Mpc<N_X> {
             clarabel: clarabel(),
             backend: p.backend,
             plan: Plan::none(p.horizon),
+            schedule: Plan::none(p.horizon),
+            tyres: vec![p.nominal_tyres(); p.horizon],
+            smooth: false,
         };
         mpc.tune(p);
         mpc
@@ -176,6 +186,7 @@ impl<const N_X: usize> Mpc<N_X> {
             self.plan.u.copy_from_slice(&self.solution.u);
             self.plan.age = 0;
         }
+        self.smooth = continues && self.backend == Backend::Structured && self.solution.outcome == Outcome::Optimal;
         self.solution.outcome
     }
 
@@ -203,16 +214,14 @@ impl<const N_X: usize> Mpc<N_X> {
         tyres: &mut impl TyreModel,
         disturbance: &Disturbance,
     ) {
-        let nominal = tyres.nominal();
+        let around = Surroundings { body, nominal: tyres.nominal(), hold, disturbance: *disturbance };
         tyres.restart();
+        self.schedule.x.copy_from_slice(&self.plan.x);
+        self.schedule.u.copy_from_slice(&self.plan.u);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
-            let middle = (self.plan.x[i] + self.plan.x[i + 1]) * 0.5;
-            let u = if N_X == NX { self.plan.u[i] } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
-            let kappa = 0.5 * (reference.kappa[i] + reference.kappa[i + 1]);
-            let vehicle = vehicle_part(&middle);
-            let lpv = embed(&vehicle, &u, kappa, body, &tyres.at(&vehicle, &u), disturbance);
-            fill(stage, &discretise(&lpv, hold), hold);
-            stage.x_ref = steady_state(reference.v_x[i + 1], reference.kappa[i + 1], body, &nominal);
+            let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
+            self.tyres[i] = tyres.at(&at.0, &at.1);
+            *stage = linearise(&at, &reference.stage(i), &self.tyres[i], &around).into();
         }
     }
 
@@ -231,47 +240,4 @@ impl<const N_X: usize> Mpc<N_X> {
 
 fn clarabel<const N_X: usize>() -> Clarabel<N_X, NU> {
     Clarabel::new(CLARABEL_TOLERANCE)
-}
-
-/// State of the quadratic programme from the vehicle's and the actuators'.
-fn full_state<const N_X: usize>(at: &Predicted) -> SVector<f64, N_X> {
-    SVector::from_fn(|i, _| if i < NX { at.x[i] } else { at.actual[i - NX] })
-}
-
-/// Reference of the states: steady cornering at the wanted speed without lateral error.
-///
-/// [Kebbati] tracks the speed alone and pulls the other states to zero. In a turn the yaw rate, the lateral velocity and the
-/// sideslip that it takes are not zero; with weights larger than the paper's that pull would drag the car off the path.
-fn steady_state<const N_X: usize>(v_x: f64, kappa: f64, body: &Body, tyres: &Tyres) -> SVector<f64, N_X> {
-    let v_y = steady_lateral_velocity(v_x, kappa, body, tyres);
-    let mut x = SVector::zeros();
-    x[V_X] = v_x;
-    x[V_Y] = v_y;
-    x[YAW_RATE] = kappa * v_x;
-    x[E_PSI] = -v_y / v_x.max(crate::model::V_GUARD);
-    x
-}
-
-/// Writes one discrete sample into a stage, behind lags when the stage has them.
-fn fill<const N_X: usize>(stage: &mut Stage<N_X, NU>, sample: &Discrete, hold: &Hold) {
-    let Discrete { Phi, Gamma, Lag, d } = sample;
-    stage.A.fixed_view_mut::<NX, NX>(0, 0).copy_from(Phi);
-    stage.d.fixed_rows_mut::<NX>(0).copy_from(d);
-    if N_X == NX {
-        stage.B.fixed_rows_mut::<NX>(0).copy_from(Gamma);
-        return;
-    }
-    stage.B.fixed_rows_mut::<NX>(0).copy_from(&(Gamma - Lag));
-    for j in 0..NU {
-        for i in 0..NX {
-            stage.A[(i, NX + j)] = Lag[(i, j)];
-        }
-        stage.A[(NX + j, NX + j)] = hold.decay[j];
-        stage.B[(NX + j, j)] = 1.0 - hold.decay[j];
-    }
-}
-
-/// The vehicle's part of a planned state.
-pub fn vehicle_part<const N_X: usize>(x: &SVector<f64, N_X>) -> State {
-    x.fixed_rows::<NX>(0).into_owned()
 }

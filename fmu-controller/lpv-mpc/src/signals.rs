@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use crate::ladder::Status;
-use crate::model::{E_PSI, E_Y, State, Tyres, V_X, V_Y, YAW_RATE};
+use crate::model::{A_X, DELTA, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::mpc::Reference;
 use crate::parameters::HORIZON_MAX;
 use crate::preview::{self, Preview};
@@ -112,6 +112,17 @@ pub struct Output {
 }
 
 impl Output {
+    /// Writes element `i` of the predicted trajectories.
+    pub(crate) fn set_stage(&mut self, i: usize, x: &State, u: &Input) {
+        self.e_y_pred[i] = x[E_Y];
+        self.e_psi_pred[i] = x[E_PSI];
+        self.v_x_pred[i] = x[V_X];
+        self.v_y_pred[i] = x[V_Y];
+        self.yaw_rate_pred[i] = x[YAW_RATE];
+        self.delta_pred[i] = u[DELTA];
+        self.a_x_pred[i] = u[A_X];
+    }
+
     /// Before the first sample: no command, no plan, the nominal beliefs.
     pub(crate) fn initial(tyres: &Tyres) -> Self {
         let nothing = Trajectory::zeros();

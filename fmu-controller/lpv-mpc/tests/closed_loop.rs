@@ -216,7 +216,7 @@ fn commands_respect_bounds_and_rates_whatever_is_measured() {
     let mut rng = Pcg64Mcg::seed_from_u64(7);
     let road = Loop::new(parameters.clone(), straight);
     let mut controller = Controller::new(parameters.clone(), 0.0).unwrap();
-    let mut before = Input::zeros();
+    let mut before: Input = Input::zeros();
     for k in 0..500 {
         let mut draw = |bound: f64| rng.random_range(-bound..bound);
         let x = State::from([15.0 + draw(15.0), draw(4.0), draw(2.0), draw(5.0), draw(1.5)]);

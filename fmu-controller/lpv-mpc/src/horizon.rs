@@ -1,0 +1,130 @@
+//! One stage of the prediction model: frozen in the middle of the schedule, discretised, with the reference it leads to.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::Scalar;
+use crate::discretise::{Discrete, Hold, discretise};
+use crate::latency::Predicted;
+use crate::model::{
+    A_X, Body, DELTA, Disturbance, E_PSI, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed,
+    steady_lateral_velocity,
+};
+use crate::qp::Stage;
+
+/// Number of states with the actuators' lags.
+pub const NX_LAGS: usize = NX + NU;
+
+/// What is the same for every stage of a plan.
+pub struct Surroundings<'a, T> {
+    /// The car.
+    pub body: &'a Body,
+    /// Tyres at small slip, for the reference.
+    pub nominal: Tyres,
+    /// Period and lags.
+    pub hold: &'a Hold,
+    /// Accelerations that the model cannot explain.
+    pub disturbance: Disturbance<T>,
+}
+
+/// The path under one stage.
+#[derive(Clone, Copy)]
+pub struct Path<T> {
+    /// Curvature at the beginning and at the end of the stage [1/m].
+    pub kappa: [T; 2],
+    /// Wanted speed at the end of the stage [m/s].
+    pub v_x: T,
+}
+
+/// One stage of the quadratic programme, `x+ = A x + B u + d` with the reference of `x+`.
+pub struct Linear<T, const N_X: usize> {
+    /// System matrix.
+    pub A: SMatrix<T, N_X, N_X>,
+    /// Input matrix.
+    pub B: SMatrix<T, N_X, NU>,
+    /// Affine term.
+    pub d: SVector<T, N_X>,
+    /// Reference.
+    pub x_ref: SVector<T, N_X>,
+}
+
+impl<const N_X: usize> From<Linear<f64, N_X>> for Stage<N_X, NU> {
+    fn from(Linear { A, B, d, x_ref }: Linear<f64, N_X>) -> Self {
+        Self { A, B, d, x_ref }
+    }
+}
+
+/// Where a stage is linearised: in the middle between its nodes, at the angle and acceleration that the actuators deliver.
+///
+/// The frozen system then is a second-order approximation of the varying one.
+pub fn middle<T: Scalar, const N_X: usize>(
+    before: &SVector<T, N_X>,
+    after: &SVector<T, N_X>,
+    u: &Input<T>,
+) -> (State<T>, Input<T>) {
+    let middle = (before + after) * T::from(0.5);
+    let acting = if N_X == NX { *u } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
+    (vehicle_part(&middle), acting)
+}
+
+/// The stage at a scheduling point.
+pub fn linearise<T: Scalar, const N_X: usize>(
+    (x, u): &(State<T>, Input<T>),
+    path: &Path<T>,
+    tyres: &Tyres,
+    around: &Surroundings<'_, T>,
+) -> Linear<T, N_X> {
+    let Surroundings { body, nominal, hold, disturbance } = around;
+    let kappa = (path.kappa[0] + path.kappa[1]) * 0.5;
+    let sample = discretise(&embed(x, u, kappa, body, tyres, disturbance), hold);
+    let (A, B) = behind_lags(&sample, hold);
+    let mut d = SVector::<T, N_X>::zeros();
+    d.fixed_rows_mut::<NX>(0).copy_from(&sample.d);
+    Linear { A, B, d, x_ref: steady_state(path.v_x, path.kappa[1], body, nominal) }
+}
+
+/// System and input matrix, with the actuators as states when there is room for them.
+fn behind_lags<T: Scalar, const N_X: usize>(
+    sample: &Discrete<T>,
+    hold: &Hold,
+) -> (SMatrix<T, N_X, N_X>, SMatrix<T, N_X, NU>) {
+    let Discrete { Phi, Gamma, Lag, .. } = sample;
+    let (mut A, mut B) = (SMatrix::<T, N_X, N_X>::zeros(), SMatrix::<T, N_X, NU>::zeros());
+    A.fixed_view_mut::<NX, NX>(0, 0).copy_from(Phi);
+    if N_X == NX {
+        B.fixed_rows_mut::<NX>(0).copy_from(Gamma);
+        return (A, B);
+    }
+    B.fixed_rows_mut::<NX>(0).copy_from(&(Gamma - Lag));
+    for j in 0..NU {
+        for i in 0..NX {
+            A[(i, NX + j)] = Lag[(i, j)];
+        }
+        A[(NX + j, NX + j)] = T::from(hold.decay[j]);
+        B[(NX + j, j)] = T::from(1.0 - hold.decay[j]);
+    }
+    (A, B)
+}
+
+/// Reference of the states: steady cornering at the wanted speed without lateral error.
+///
+/// [Kebbati] tracks the speed alone and pulls the other states to zero. In a turn the yaw rate, the lateral velocity and the
+/// sideslip that it takes are not zero; with weights larger than the paper's that pull would drag the car off the path.
+pub fn steady_state<T: Scalar, const N_X: usize>(v_x: T, kappa: T, body: &Body, tyres: &Tyres) -> SVector<T, N_X> {
+    let v_y = steady_lateral_velocity(v_x, kappa, body, tyres);
+    let mut x = SVector::zeros();
+    x[V_X] = v_x;
+    x[V_Y] = v_y;
+    x[YAW_RATE] = kappa * v_x;
+    x[E_PSI] = -v_y / v_x.larger(V_GUARD);
+    x
+}
+
+/// State of the quadratic programme from the vehicle's and the actuators'.
+pub fn full_state<T: Scalar, const N_X: usize>(at: &Predicted<T>) -> SVector<T, N_X> {
+    SVector::from_fn(|i, _| if i < NX { at.x[i] } else { T::from(at.actual[i - NX]) })
+}
+
+/// The vehicle's part of a planned state.
+pub fn vehicle_part<T: Scalar, const N_X: usize>(x: &SVector<T, N_X>) -> State<T> {
+    x.fixed_rows::<NX>(0).into_owned()
+}

@@ -1,0 +1,138 @@
+//! How the last command and plan change with what was measured and wanted.
+//!
+//! The sample is differentiated in two parts. What comes before the quadratic programme (filter, latency, schedule, model) runs
+//! once more on dual numbers, which carry exact derivatives; the programme itself is differentiated through its conditions of
+//! optimality on the final active set. There is no derivative where an infinitesimal change alters the active set: the one of
+//! the side on which the solver ended is returned. Tyres that the network gave are taken as they are, its dependence on the
+//! measurement is left out.
+
+use num_dual::Dual64;
+use serde::{Deserialize, Serialize};
+
+use crate::discretise::Hold;
+use crate::estimator::Estimator;
+use crate::horizon::{Path, Surroundings, full_state, linearise, middle, vehicle_part};
+use crate::latency::{Latency, Predicted};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
+use crate::mpc::Mpc;
+use crate::parameters::{Estimation, HORIZON_MAX};
+use crate::qp::{Perturbation, Stage};
+use crate::{Inputs, Output, Parameters};
+
+/// What the last sample started from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Snapshot {
+    pub inputs: Inputs,
+    /// The filter before the measurement.
+    pub estimator: Estimator,
+    /// Time since the sample before [s], and what the actuators delivered in it.
+    pub duration: f64,
+    pub delivered: Input,
+    /// Tyres of the filter and of the prediction over the latency.
+    pub tyres: [Tyres; 2],
+    /// Communication step [s].
+    pub step: f64,
+}
+
+/// A quantity with its derivative along the direction asked for.
+fn dual(value: f64, slope: f64) -> Dual64 {
+    Dual64::new(value, slope)
+}
+
+impl Snapshot {
+    /// Before the first sample.
+    pub fn new(tyres: &Tyres, sensor_noise: f64) -> Self {
+        Self {
+            inputs: Inputs::default(),
+            estimator: Estimator::new(sensor_noise),
+            duration: 0.0,
+            delivered: Input::zeros(),
+            tyres: [*tyres; 2],
+            step: 0.0,
+        }
+    }
+
+    /// Estimated state and disturbance.
+    fn estimate(&self, direction: &Inputs, p: &Parameters, body: &Body) -> (State<Dual64>, Disturbance<Dual64>) {
+        let mut measured = self.inputs.state().zip_map(&direction.state(), dual);
+        if p.estimation == Estimation::Measured {
+            return (measured, Disturbance::zeros());
+        }
+        if !p.v_y_measured {
+            measured[V_Y] = Dual64::from(f64::NAN);
+        }
+        let kappa = dual(self.inputs.kappa_ref[0], direction.kappa_ref[0]);
+        let mut estimator = self.estimator.to_dual();
+        estimator.update(&measured, kappa, &self.delivered, self.duration, body, &self.tyres[0]);
+        (estimator.x, estimator.disturbance)
+    }
+
+    /// State and disturbance when the command acts.
+    fn predict(
+        &self,
+        direction: &Inputs,
+        p: &Parameters,
+        body: &Body,
+        latency: &Latency,
+    ) -> (Predicted<Dual64>, Disturbance<Dual64>) {
+        let (x, disturbance) = self.estimate(direction, p, body);
+        let kappa = |s: f64| dual(self.inputs.curvature(s / p.t_s), direction.curvature(s / p.t_s));
+        (latency.predict(&x, self.step, kappa, body, &self.tyres[1], &disturbance), disturbance)
+    }
+}
+
+/// Derivative of the plan of the last sample along `direction`, written as an [`Output`] whose quantities are derivatives.
+///
+/// Nothing when there is none: the sample's plan is not an exact optimum, or was the first and found its own schedule.
+pub(crate) fn along<const N_X: usize>(
+    mpc: &Mpc<N_X>,
+    snapshot: &Snapshot,
+    direction: &Inputs,
+    (p, body, nominal, latency): (&Parameters, &Body, Tyres, &Latency),
+) -> Option<Output> {
+    if !mpc.smooth {
+        return None;
+    }
+    // A preview that is held follows its first element.
+    let direction = Inputs { hold_preview: snapshot.inputs.hold_preview, ..direction.clone() };
+    let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
+    let (at, disturbance) = snapshot.predict(&direction, p, body, latency);
+    let periods = (snapshot.step + p.input_delay) / p.t_s;
+    let (reference, slope) = (snapshot.inputs.reference(periods), direction.reference(periods));
+    let around = Surroundings { body, nominal, hold: &hold, disturbance };
+
+    let mut change = Perturbation::new(mpc.plan.u.len());
+    let x_0 = full_state::<Dual64, N_X>(&at);
+    change.x_0 = x_0.map(|x| x.eps);
+    for (i, stage) in change.stages.iter_mut().enumerate() {
+        let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
+        let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
+        let (path, path_slope) = (reference.stage(i), slope.stage(i));
+        let path = Path {
+            kappa: [0, 1].map(|j| dual(path.kappa[j], path_slope.kappa[j])),
+            v_x: dual(path.v_x, path_slope.v_x),
+        };
+        let linear = linearise::<Dual64, N_X>(&scheduled, &path, &mpc.tyres[i], &around);
+        *stage = Stage {
+            A: linear.A.map(|a| a.eps),
+            B: linear.B.map(|b| b.eps),
+            d: linear.d.map(|d| d.eps),
+            x_ref: linear.x_ref.map(|x| x.eps),
+        };
+    }
+    let tangent = mpc.structured.tangent(&mpc.problem, &mpc.solution, &change);
+
+    let mut output = Output::initial(&Tyres::secant(0.0, 0.0));
+    output.delta = tangent.u[0][DELTA];
+    output.a_x = tangent.u[0][A_X];
+    let last = tangent.u.len() - 1;
+    for i in 0..HORIZON_MAX {
+        output.set_stage(i, &vehicle_part(&tangent.x[i.min(last) + 1]), &tangent.u[i.min(last)]);
+    }
+    // The slack is that of the worst stage.
+    let excess = |i: &usize| mpc.problem.excess(&mpc.solution.x[*i]);
+    if let Some(worst) = (1..=last + 1).max_by(|a, b| excess(a).total_cmp(&excess(b))).filter(|i| excess(i) > 0.0) {
+        output.slack_e_y = mpc.solution.x[worst][E_Y].signum() * tangent.x[worst][E_Y];
+    }
+    Some(output)
+}

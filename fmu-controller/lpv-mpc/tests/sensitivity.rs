@@ -1,0 +1,137 @@
+//! The exact derivative of command and plan against central differences of whole controller steps.
+
+use lpv_mpc::preview::Preview;
+use lpv_mpc::{Controller, Error, Estimation, Inputs, Output, Parameters, Status};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+const H: f64 = 0.011;
+
+/// A slalom whose measurements wander, so that no derivative vanishes by symmetry.
+fn inputs(t: f64) -> Inputs {
+    Inputs {
+        v_x: 14.0 + 0.3 * t.sin(),
+        v_y: 0.1 * (2.0 * t).sin(),
+        yaw_rate: 0.1 * (1.5 * t).sin(),
+        e_y: 0.02 * (1.1 * t).cos(),
+        e_psi: 0.01 * (0.7 * t).sin(),
+        kappa_ref: Preview::from_fn(|i, _| 0.006 * (1.5 * (t + i as f64 * 0.033)).sin()),
+        v_x_ref: Preview::from_fn(|i, _| 14.0 + 0.2 * (t + i as f64 * 0.033).cos()),
+        hold_preview: false,
+    }
+}
+
+fn zero() -> Inputs {
+    Inputs::default()
+}
+
+fn moved(inputs: &Inputs, direction: &Inputs, by: f64) -> Inputs {
+    Inputs {
+        v_x: inputs.v_x + by * direction.v_x,
+        v_y: inputs.v_y + by * direction.v_y,
+        yaw_rate: inputs.yaw_rate + by * direction.yaw_rate,
+        e_y: inputs.e_y + by * direction.e_y,
+        e_psi: inputs.e_psi + by * direction.e_psi,
+        kappa_ref: inputs.kappa_ref + direction.kappa_ref * by,
+        v_x_ref: inputs.v_x_ref + direction.v_x_ref * by,
+        hold_preview: inputs.hold_preview,
+    }
+}
+
+fn directions() -> Vec<(&'static str, Inputs)> {
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let mut draw = || rng.random_range(-1.0..1.0);
+    let curvature = Preview::from_fn(|_, _| 0.01 * draw());
+    let speed = Preview::from_fn(|_, _| draw());
+    vec![
+        ("v_x", Inputs { v_x: 1.0, ..zero() }),
+        ("v_y", Inputs { v_y: 1.0, ..zero() }),
+        ("yaw_rate", Inputs { yaw_rate: 1.0, ..zero() }),
+        ("e_y", Inputs { e_y: 1.0, ..zero() }),
+        ("e_psi", Inputs { e_psi: 1.0, ..zero() }),
+        ("kappa_ref", Inputs { kappa_ref: curvature, ..zero() }),
+        ("v_x_ref", Inputs { v_x_ref: speed, ..zero() }),
+    ]
+}
+
+fn quantities(o: &Output) -> Vec<f64> {
+    let mut all = vec![o.delta, o.a_x];
+    for trajectory in [o.e_y_pred, o.e_psi_pred, o.v_x_pred, o.v_y_pred, o.yaw_rate_pred, o.delta_pred, o.a_x_pred] {
+        all.extend(trajectory.iter());
+    }
+    all
+}
+
+fn advanced(controller: &Controller, t: f64, inputs: &Inputs) -> Controller {
+    let mut next = controller.clone();
+    next.advance(t, H, inputs).unwrap();
+    next
+}
+
+fn compare(parameters: &Parameters) {
+    let mut controller = Controller::new(parameters.clone(), 0.0).unwrap();
+    for k in 0..30 {
+        let t = f64::from(k) * H;
+        let at = inputs(t);
+        let after = advanced(&controller, t, &at);
+        if k > 3 && after.samples() > controller.samples() {
+            assert_eq!(after.output().status, Status::Optimal);
+            for (name, direction) in directions() {
+                let exact = quantities(&after.along(&direction).unwrap());
+                // Central differences: third derivatives times 1e-10, and rounding of 1e-16 times a gain over 1e-5.
+                let eps = 1e-5;
+                let ahead = quantities(advanced(&controller, t, &moved(&at, &direction, eps)).output());
+                let behind = quantities(advanced(&controller, t, &moved(&at, &direction, -eps)).output());
+                for (i, exact) in exact.into_iter().enumerate() {
+                    let difference = (ahead[i] - behind[i]) / (2.0 * eps);
+                    let tolerance = 1e-5 * (1.0 + difference.abs());
+                    assert!((exact - difference).abs() < tolerance, "{name}, quantity {i}: {exact} for {difference}");
+                }
+            }
+        }
+        controller = after;
+    }
+}
+
+#[test]
+fn derivative_is_the_limit_of_differences() {
+    compare(&Parameters::default());
+}
+
+#[test]
+fn derivative_goes_through_lags_and_delay() {
+    compare(&Parameters { tau_delta: 0.1, tau_a_x: 0.2, input_delay: 0.05, ..Parameters::default() });
+}
+
+#[test]
+fn derivative_of_the_papers_controller() {
+    compare(&Parameters { estimation: Estimation::Measured, ..Parameters::default() });
+}
+
+#[test]
+fn an_unmeasured_velocity_has_no_influence() {
+    let parameters = Parameters { v_y_measured: false, ..Parameters::default() };
+    compare(&parameters);
+    let mut controller = Controller::new(parameters, 0.0).unwrap();
+    controller.advance(0.0, 0.033, &inputs(0.0)).unwrap();
+    controller.advance(0.033, 0.033, &inputs(0.033)).unwrap();
+    assert_eq!(controller.along(&Inputs { v_y: 1.0, ..zero() }).unwrap().delta, 0.0);
+}
+
+#[test]
+fn between_samples_nothing_depends_on_the_inputs() {
+    let mut controller = Controller::new(Parameters::default(), 0.0).unwrap();
+    controller.advance(0.0, 0.001, &inputs(0.0)).unwrap();
+    controller.advance(0.001, 0.001, &inputs(0.001)).unwrap();
+    let derivative = controller.along(&Inputs { e_y: 1.0, ..zero() }).unwrap();
+    assert!(quantities(&derivative).iter().all(|d| *d == 0.0));
+}
+
+#[test]
+fn where_there_is_no_derivative_the_reason_is_given() {
+    let mut controller = Controller::new(Parameters::default(), 0.0).unwrap();
+    controller.advance(0.0, 0.001, &inputs(0.0)).unwrap();
+    assert!(matches!(controller.along(&zero()), Err(Error::NoDerivative(_))), "the first plan");
+    controller.advance(0.001, 0.1, &inputs(0.0)).unwrap();
+    assert!(matches!(controller.along(&zero()), Err(Error::NoDerivative(_))), "three samples in one step");
+}
