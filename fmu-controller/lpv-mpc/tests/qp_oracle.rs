@@ -64,10 +64,7 @@ fn agrees_with_clarabel<const NX: usize, const NU: usize>() {
         match solution.outcome {
             Outcome::Optimal => count(&tally.optimal),
             Outcome::InteriorPoint => count(&tally.interior),
-            _ => {
-                println!("FLAG {:.1e} {stress:?}", solution.residual);
-                count(&tally.flagged);
-            }
+            _ => count(&tally.flagged),
         }
         let residual = optimality::residual(&problem, &solution);
         match solution.outcome {
