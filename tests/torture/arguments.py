@@ -2,9 +2,10 @@
 
 import ctypes
 import math
+import random
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 
-from fmu import C_TYPES, DISCARD, ERROR, FUNCTIONS, OK, Callbacks, Slave
+from fmu import C_TYPES, DISCARD, ERROR, FUNCTIONS, OK, WARNING, Callbacks, Slave
 
 
 def check_null_instance_is_an_error(fmu):
@@ -158,6 +159,42 @@ def check_inputs_that_are_not_finite_are_refused_and_the_next_recovers(fmu):
             assert slave.set(variable.name, value) == ERROR
             assert variable.name in slave.errors()[0]
     assert slave.run(0, 20) == calm.run(0, 20)
+
+
+def check_extreme_inputs_are_survived(fmu):
+    generator = random.Random(3)
+    inputs = fmu.named("input", "Real")
+    for _ in range(20):
+        slave = fmu.started()
+        slave.run(0, 5)
+        for k in range(5, 15):
+            for variable in inputs:
+                low, high = variable.bound("min"), variable.bound("max")
+                extremes = [0.0, -1e-308, 1e-3, -30.0, -1e300 if low is None else low, 1e300 if high is None else high]
+                assert slave.set(variable.name, generator.choice(extremes)) == OK
+            status = slave.step(k * 0.01, 0.01)
+            assert status in (OK, WARNING, ERROR)
+            if status == ERROR:
+                break
+            assert all(math.isfinite(value) for value in slave.reals(fmu.outputs())), "a number came out that is none"
+        else:
+            # After inputs that were bad but legal, good ones must be good enough again.
+            slave.run(15, 40)
+            assert all(math.isfinite(value) for value in slave.reals(fmu.outputs()))
+        assert slave.Reset() == OK
+        slave.free()
+
+
+def check_irregular_steps_are_taken(fmu):
+    generator, slave = random.Random(4), fmu.started()
+    t = 0.0
+    for _ in range(300):
+        h = 10.0 ** generator.uniform(-6, -0.5)
+        slave.excite(t)
+        assert slave.step(t, h) in (OK, WARNING), (t, h, slave.messages[-1:])
+        t += h
+        assert slave.last_time() == t
+    assert all(math.isfinite(value) for value in slave.reals(fmu.outputs()))
 
 
 def check_values_outside_of_their_range_are_refused(fmu):

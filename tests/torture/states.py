@@ -174,6 +174,15 @@ def check_a_buffer_that_is_too_small_is_refused(fmu):
     slave.release(state)
 
 
+def check_memory_that_is_no_state_is_refused(fmu):
+    slave = fmu.started()
+    for byte in (0x00, 0x55, 0xFF):
+        memory = (c_ubyte * 65536)(*[byte] * 65536)
+        assert slave.SetFMUstate(memory) == ERROR
+        assert slave.SerializeFMUstate(memory, memory, 65536) == ERROR
+        assert bytes(memory) == bytes([byte] * 65536)
+
+
 def check_states_are_not_exchanged_between_different_fmus(fmu):
     slave = fmu.started()
     data = bytearray(slave.serialized())
