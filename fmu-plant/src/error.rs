@@ -9,13 +9,8 @@ pub enum Error {
     #[error(transparent)]
     Vehicle(#[from] vehicle::Error),
     /// A road file that cannot be read.
-    #[error("road file \"{path}\" cannot be read: {reason}")]
-    File {
-        /// Where it was looked for.
-        path: PathBuf,
-        /// What the system says.
-        reason: String,
-    },
+    #[error("road {0}")]
+    File(model_description::FileError),
     /// A road file that is refused for what is in it.
     #[error("road file \"{path}\": {reason}")]
     Content {

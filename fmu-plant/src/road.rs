@@ -1,9 +1,8 @@
 //! The parameter `road`: a manoeuvre's name or a file.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use percent_encoding::percent_decode_str;
+use model_description::read_file;
 use vehicle::{Parameters, Road, road};
 
 use crate::error::Error;
@@ -22,52 +21,15 @@ pub fn load(text: &str, parameters: &Parameters, resources: Option<&Path>) -> Re
     if road::NAMES.contains(&text) || !is_file {
         return Ok(Road::named(text, parameters)?);
     }
-    let path = local(text);
-    let found = resources.map(|folder| folder.join(&path)).filter(|path| path.is_file()).unwrap_or(path);
-    let content = read(&found).map_err(|reason| Error::File { path: found.clone(), reason })?;
-    Road::from_csv_within(&content, parameters.road_tolerance).map_err(|reason| Error::Content { path: found, reason })
-}
-
-/// The path that a file URI or a plain path names.
-fn local(text: &str) -> PathBuf {
-    let is_uri = text.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("file:"));
-    if !is_uri {
-        return PathBuf::from(text);
-    }
-    let rest = &text[5..];
-    let rest = rest.strip_prefix("//").unwrap_or(rest);
-    let rest = rest.strip_prefix("localhost").unwrap_or(rest);
-    let decoded = percent_decode_str(rest).decode_utf8_lossy().into_owned();
-    // A Windows drive stands behind a slash that is not part of the path.
-    let drive = decoded.as_bytes();
-    let behind = usize::from(drive.len() > 2 && drive[0] == b'/' && drive[2] == b':');
-    PathBuf::from(&decoded[behind..])
-}
-
-fn read(path: &Path) -> Result<String, String> {
-    let size = fs::metadata(path).map_err(|error| error.to_string())?.len();
-    if size > SIZE_MAX {
-        return Err(format!("{size} bytes are more than the {SIZE_MAX} that are taken"));
-    }
-    fs::read_to_string(path).map_err(|error| error.to_string())
+    let (path, content) = read_file(text, resources, SIZE_MAX).map_err(Error::File)?;
+    Road::from_csv_within(&content, parameters.road_tolerance).map_err(|reason| Error::Content { path, reason })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
 
-    #[test]
-    fn every_way_to_write_a_file_is_understood() {
-        for (text, want) in [
-            ("a b.csv", "a b.csv"),
-            ("file:///tmp/a%20b.csv", "/tmp/a b.csv"),
-            ("file:/tmp/a.csv", "/tmp/a.csv"),
-            ("file://localhost/tmp/a.csv", "/tmp/a.csv"),
-            ("FILE:///C:/tracks/a.csv", "C:/tracks/a.csv"),
-        ] {
-            assert_eq!(local(text), PathBuf::from(want), "{text}");
-        }
-    }
+    use super::*;
 
     #[test]
     fn resources_come_before_the_working_directory() {

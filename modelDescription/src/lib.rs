@@ -101,6 +101,7 @@ pub use current::assert_xml_current;
 pub use error::Error;
 pub use lifecycle::{FUNCTIONS, Function, Phase};
 pub use model::{Category, Experiment, Info, InputDerivative, Log, Model, Outcome, Silent, Step};
+pub use resources::{FileError, read_file};
 pub use table::{Enumeration, Item, Place, Role, Row, Table};
 pub use terminals::terminals;
 pub use value::{FromScalar, Kind, Scalar, Value};

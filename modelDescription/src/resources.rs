@@ -1,7 +1,9 @@
-//! The resources folder from the URI that the importer passes (FMI 2.0.4, section 2.1.5; RFC 8089).
+//! The resources folder from the URI that the importer passes (FMI 2.0.4, section 2.1.5; RFC 8089), and files that
+//! parameters name.
 
 use std::ffi::CStr;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use percent_encoding::percent_decode;
 
@@ -18,6 +20,35 @@ pub(crate) fn folder(location: Option<&CStr>) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err(format!("resource folder {shown:?} does not exist, so the built-in defaults are used"))
+    }
+}
+
+/// A file that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("file \"{path}\" cannot be read: {reason}")]
+pub struct FileError {
+    /// Where it was looked for.
+    pub path: PathBuf,
+    /// What the system says.
+    pub reason: String,
+}
+
+/// The text of a file that a String parameter names, and where it was found.
+///
+/// `name` is a path or a file URI. A relative one is looked for in the resources and then in the working directory.
+///
+/// # Errors
+/// If there is no such file, if it is no UTF-8 text, or if it is longer than `size_max` [bytes].
+pub fn read_file(name: &str, resources: Option<&Path>, size_max: u64) -> Result<(PathBuf, String), FileError> {
+    let named = path(name.as_bytes()).unwrap_or_else(|| PathBuf::from(name));
+    let found = resources.map(|folder| folder.join(&named)).filter(|path| path.is_file()).unwrap_or(named);
+    let text = fs::metadata(&found).map_err(|error| error.to_string()).and_then(|data| match data.len() {
+        size if size > size_max => Err(format!("{size} bytes are more than the {size_max} that are taken")),
+        _ => fs::read_to_string(&found).map_err(|error| error.to_string()),
+    });
+    match text {
+        Ok(text) => Ok((found, text)),
+        Err(reason) => Err(FileError { path: found, reason }),
     }
 }
 
