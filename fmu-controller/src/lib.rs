@@ -1,19 +1,26 @@
 //! The adaptive LPV-MPC as an FMI 2.0 co-simulation unit: the variable table and the call into `lpv-mpc`.
 
+mod error;
+mod network;
 mod variables;
 
 use std::time::Instant;
 
-use lpv_mpc::{Controller, Inputs, Parameters, Status};
-use model_description::{Category, Experiment, Info, Log, Model, Outcome, Step, Table};
+use error::Error;
+use lpv_mpc::{Adaptation, Controller, Inputs, Output, Parameters, Status};
+use model_description::{Category, Experiment, Info, InputDerivative, Log, Model, Outcome, Step, Table};
 use serde::{Deserialize, Serialize};
 
 /// The controller with everything that its importer may set.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LpvMpcController {
     parameters: Parameters,
+    /// File of the network's weights; empty: the one that is built in.
+    network_file: String,
     inputs: Inputs,
     controller: Controller,
+    /// What the controller shows.
+    output: Output,
     /// Wall clock of the last step in which a sample was taken [s].
     solve_time: f64,
 }
@@ -21,9 +28,12 @@ pub struct LpvMpcController {
 impl Default for LpvMpcController {
     fn default() -> Self {
         let parameters = Parameters::default();
+        let controller = Controller::new(parameters.clone(), 0.0).expect("a test shows that the defaults are valid");
         Self {
-            controller: Controller::new(parameters.clone(), 0.0).expect("a test shows that the defaults are valid"),
+            output: controller.output().clone(),
+            controller,
             parameters,
+            network_file: String::new(),
             inputs: Inputs::default(),
             solve_time: 0.0,
         }
@@ -39,35 +49,52 @@ impl Model for LpvMpcController {
         step_size: 0.001,
         stop_time: 15.0,
         max_step: 10.0,
-        max_input_derivative_order: 0,
+        max_input_derivative_order: 1,
         max_output_derivative_order: 0,
-        directional_derivative: false,
+        directional_derivative: true,
     };
 
-    type Error = lpv_mpc::Error;
+    type Error = Error;
 
     fn table() -> &'static Table<Self> {
         variables::table()
     }
 
-    fn initialize(&mut self, experiment: &Experiment<'_>, _log: &mut dyn Log) -> Result<(), Self::Error> {
-        self.controller = Controller::new(self.parameters.clone(), experiment.start)?;
+    fn initialize(&mut self, experiment: &Experiment<'_>, log: &mut dyn Log) -> Result<(), Error> {
+        let parameters = self.parameters.clone();
+        self.controller = if parameters.adaptation == Adaptation::Constant {
+            Controller::new(parameters, experiment.start)?
+        } else {
+            let network = network::load(&self.network_file, experiment.resources)?;
+            if let Some(difference) = network::difference(&network, &parameters) {
+                log.log(Category::Warning, &format!("the network was trained for another car: {difference}"));
+            }
+            Controller::with_network(parameters, experiment.start, network)?
+        };
+        self.output.clone_from(self.controller.output());
         Ok(())
     }
 
-    fn tune(&mut self, _log: &mut dyn Log) -> Result<(), Self::Error> {
-        self.controller.tune(&self.parameters)
+    fn tune(&mut self, _log: &mut dyn Log) -> Result<(), Error> {
+        Ok(self.controller.tune(&self.parameters)?)
     }
 
-    fn step(&mut self, step: &Step<'_>, log: &mut dyn Log) -> Result<Outcome, Self::Error> {
+    fn step(&mut self, step: &Step<'_>, log: &mut dyn Log) -> Result<Outcome, Error> {
         let samples = self.controller.samples();
         let before = Instant::now();
-        self.controller.advance(step.t, step.h, &self.inputs)?;
+        if step.input_derivatives.is_empty() {
+            self.controller.advance(step.t, step.h, &self.inputs)?;
+        } else {
+            let rates =
+                variables::along(step.input_derivatives.iter().map(|d: &InputDerivative| (d.reference, d.value)));
+            self.controller.advance_along(step.t, step.h, &self.inputs, &rates)?;
+        }
         if self.controller.samples() == samples {
             return Ok(Outcome::Ok);
         }
         self.solve_time = before.elapsed().as_secs_f64();
-        let status = self.controller.output().status;
+        self.output.clone_from(self.controller.output());
+        let status = self.output.status;
         if log.enabled(Category::Event) {
             log.log(Category::Event, &format!("sample at {} s: {status}", step.t));
         }
@@ -81,6 +108,25 @@ impl Model for LpvMpcController {
                 )))
             }
         }
+    }
+
+    fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<(), Error> {
+        if let Some(&reference) = knowns.iter().find(|known| !variables::is_input(**known)) {
+            return Err(Error::NoInput(variables::name(reference)));
+        }
+        let direction = variables::along(knowns.iter().copied().zip(seed.iter().copied()));
+        // A model that shows derivatives where this one shows values: the table then reads them.
+        let tangent = Self { output: self.controller.along(&direction)?, solve_time: 0.0, ..self.clone() };
+        for (slot, &unknown) in sensitivity.iter_mut().zip(unknowns) {
+            *slot = variables::real(&tangent, unknown);
+        }
+        Ok(())
     }
 }
 

@@ -2,8 +2,8 @@
 
 use lpv_mpc::parameters::HORIZON_MAX;
 use lpv_mpc::preview::PREVIEW;
-use lpv_mpc::{Adaptation, Backend, Estimation, Status};
-use model_description::{Enumeration, Item, Table, variables};
+use lpv_mpc::{Adaptation, Backend, Estimation, Inputs, Status};
+use model_description::{Enumeration, Item, Scalar, Table, variables};
 
 use crate::LpvMpcController;
 
@@ -38,11 +38,23 @@ const STATUS: Enumeration = Enumeration {
 const ADAPTATION: Enumeration = Enumeration {
     name: "Adaptation",
     description: "Where the cornering stiffnesses of the prediction model come from",
-    items: &[Item {
-        value: Adaptation::Constant as i32,
-        name: "constant",
-        description: "c_f_nominal and c_r_nominal, always",
-    }],
+    items: &[
+        Item {
+            value: Adaptation::Constant as i32,
+            name: "constant",
+            description: "c_f_nominal and c_r_nominal, always",
+        },
+        Item {
+            value: Adaptation::NetworkNow as i32,
+            name: "network_now",
+            description: "The network's answer at the measurement, held along the horizon",
+        },
+        Item {
+            value: Adaptation::NetworkHorizon as i32,
+            name: "network_horizon",
+            description: "The network rolled along the previous plan, one stage at a time",
+        },
+    ],
 };
 
 const BACKEND: Enumeration = Enumeration {
@@ -75,6 +87,46 @@ const ESTIMATION: Enumeration = Enumeration {
     ],
 };
 
+/// First value reference behind the previews.
+const INPUTS: usize = 5 + 2 * PREVIEW;
+
+/// A direction in the space of the inputs, given as pairs of value reference and component.
+pub fn along(components: impl Iterator<Item = (u32, f64)>) -> Inputs {
+    let mut direction = Inputs::default();
+    for (reference, component) in components {
+        let place = match reference as usize {
+            0 => &mut direction.v_x,
+            1 => &mut direction.v_y,
+            2 => &mut direction.yaw_rate,
+            3 => &mut direction.e_y,
+            4 => &mut direction.e_psi,
+            k if k < 5 + PREVIEW => &mut direction.kappa_ref[k - 5],
+            k if k < INPUTS => &mut direction.v_x_ref[k - 5 - PREVIEW],
+            _ => continue,
+        };
+        *place += component;
+    }
+    direction
+}
+
+/// Whether a value reference belongs to an input.
+pub fn is_input(reference: u32) -> bool {
+    (reference as usize) < INPUTS
+}
+
+/// Name behind a value reference.
+pub fn name(reference: u32) -> String {
+    table().lookup(reference).map_or_else(|| reference.to_string(), |(row, element)| row.element_name(element))
+}
+
+/// Value of a Real variable; 0 for another type.
+pub fn real(model: &LpvMpcController, reference: u32) -> f64 {
+    match table().lookup(reference).map(|(row, element)| row.read(model, element)) {
+        Some(Scalar::Real(value)) => value,
+        _ => 0.0,
+    }
+}
+
 /// Value references are rows: append, never reorder.
 pub fn table() -> &'static Table<LpvMpcController> {
     variables! { LpvMpcController;
@@ -86,22 +138,22 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Input kappa_ref [PREVIEW] ["1/m"] "Curvature of the path now (element 1) and at the next 40 sample times, positive to the left", terminal "preview" => inputs.kappa_ref;
         Input v_x_ref [PREVIEW] ["m/s"] "Wanted speed now (element 1) and at the next 40 sample times", terminal "preview" => inputs.v_x_ref;
 
-        Output delta ["rad"] "Front steering angle command", terminal "command" => { get |m| m.controller.output().delta };
-        Output a_x ["m/s2"] "Longitudinal acceleration command", terminal "command" => { get |m| m.controller.output().a_x };
-        Output c_f ["N/rad"] "Front cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_f };
-        Output c_r ["N/rad"] "Rear cornering stiffness that the controller believes in" => { get |m| m.controller.output().c_r };
-        Output status "How good the present command is", items &STATUS => { get |m| m.controller.output().status as i32 };
-        Output iterations "Iterations of the solver in the last sample" => { get |m| m.controller.output().iterations };
-        Output kkt_residual ["1"] "Scaled residual of the conditions of optimality" => { get |m| m.controller.output().kkt_residual };
-        Output slack_e_y ["m"] "Largest predicted excess over e_y_max" => { get |m| m.controller.output().slack_e_y };
+        Output delta ["rad"] "Front steering angle command", terminal "command" => { get |m| m.output.delta };
+        Output a_x ["m/s2"] "Longitudinal acceleration command", terminal "command" => { get |m| m.output.a_x };
+        Output c_f ["N/rad"] "Front cornering stiffness that the controller believes in" => { get |m| m.output.c_f };
+        Output c_r ["N/rad"] "Rear cornering stiffness that the controller believes in" => { get |m| m.output.c_r };
+        Output status "How good the present command is", items &STATUS => { get |m| m.output.status as i32 };
+        Output iterations "Iterations of the solver in the last sample" => { get |m| m.output.iterations };
+        Output kkt_residual ["1"] "Scaled residual of the conditions of optimality" => { get |m| m.output.kkt_residual };
+        Output slack_e_y ["m"] "Largest predicted excess over e_y_max" => { get |m| m.output.slack_e_y };
         Output solve_time ["s"] "Wall clock of the last sample, the only value that is not reproducible" => { get |m| m.solve_time };
-        Output e_y_pred [HORIZON_MAX] ["m"] "Predicted lateral error, one element per period; beyond the horizon the last value" => { get |m, k| m.controller.output().e_y_pred[k] };
-        Output e_psi_pred [HORIZON_MAX] ["rad"] "Predicted heading error" => { get |m, k| m.controller.output().e_psi_pred[k] };
-        Output v_x_pred [HORIZON_MAX] ["m/s"] "Predicted longitudinal velocity" => { get |m, k| m.controller.output().v_x_pred[k] };
-        Output v_y_pred [HORIZON_MAX] ["m/s"] "Predicted lateral velocity" => { get |m, k| m.controller.output().v_y_pred[k] };
-        Output yaw_rate_pred [HORIZON_MAX] ["rad/s"] "Predicted yaw rate" => { get |m, k| m.controller.output().yaw_rate_pred[k] };
-        Output delta_pred [HORIZON_MAX] ["rad"] "Planned steering angle commands" => { get |m, k| m.controller.output().delta_pred[k] };
-        Output a_x_pred [HORIZON_MAX] ["m/s2"] "Planned acceleration commands" => { get |m, k| m.controller.output().a_x_pred[k] };
+        Output e_y_pred [HORIZON_MAX] ["m"] "Predicted lateral error, one element per period; beyond the horizon the last value" => { get |m, k| m.output.e_y_pred[k] };
+        Output e_psi_pred [HORIZON_MAX] ["rad"] "Predicted heading error" => { get |m, k| m.output.e_psi_pred[k] };
+        Output v_x_pred [HORIZON_MAX] ["m/s"] "Predicted longitudinal velocity" => { get |m, k| m.output.v_x_pred[k] };
+        Output v_y_pred [HORIZON_MAX] ["m/s"] "Predicted lateral velocity" => { get |m, k| m.output.v_y_pred[k] };
+        Output yaw_rate_pred [HORIZON_MAX] ["rad/s"] "Predicted yaw rate" => { get |m, k| m.output.yaw_rate_pred[k] };
+        Output delta_pred [HORIZON_MAX] ["rad"] "Planned steering angle commands" => { get |m, k| m.output.delta_pred[k] };
+        Output a_x_pred [HORIZON_MAX] ["m/s2"] "Planned acceleration commands" => { get |m, k| m.output.a_x_pred[k] };
 
         Parameter m ["kg"] "Mass", min 1.0, max 1e5 => parameters.m;
         Parameter i_z ["kg m2"] "Yaw inertia", min 1.0, max 1e6 => parameters.i_z;
@@ -143,12 +195,17 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Parameter sensor_noise ["1"] "Standard deviations that the filter assumes, in units of 0.03 m/s, 0.002 rad/s, 0.01 m and 0.002 rad", min 1e-3, max 1e3 => parameters.sensor_noise;
         Parameter v_y_measured "Whether the lateral velocity is measured; if not, it is estimated" => parameters.v_y_measured;
         Parameter hold_preview "Whether only element 1 of each preview is given and holds for the others" => inputs.hold_preview;
+        Parameter network_file "File of the network's weights, a path or file URI, relative to the resources; empty: the built-in network" => network_file;
+        Output confidence ["1"] "How far the network is believed: 0 the nominal stiffnesses, 1 the network's", min 0.0, max 1.0 => { get |m| m.output.confidence };
     }
 }
 
 /// The table lets only values of the enumeration through.
-fn adaptation(_value: i32) -> Adaptation {
-    Adaptation::Constant
+fn adaptation(value: i32) -> Adaptation {
+    [Adaptation::NetworkNow, Adaptation::NetworkHorizon]
+        .into_iter()
+        .find(|mode| *mode as i32 == value)
+        .unwrap_or(Adaptation::Constant)
 }
 
 /// The table lets only values of the enumeration through.
@@ -159,4 +216,26 @@ fn backend(value: i32) -> Backend {
 /// The table lets only values of the enumeration through.
 fn estimation(value: i32) -> Estimation {
     if value == Estimation::Kalman as i32 { Estimation::Kalman } else { Estimation::Measured }
+}
+
+#[cfg(test)]
+mod tests {
+    use model_description::Role;
+
+    use super::*;
+
+    #[test]
+    fn directions_follow_the_table() {
+        let inputs: Vec<u32> =
+            table().variables().filter(|(.., row, _)| row.role == Role::Input).map(|(vr, ..)| vr).collect();
+        assert_eq!(inputs.len(), INPUTS);
+        for seed in &inputs {
+            let model = LpvMpcController { inputs: along([(*seed, 1.0)].into_iter()), ..LpvMpcController::default() };
+            for reference in &inputs {
+                assert!(is_input(*reference));
+                assert_eq!(real(&model, *reference), f64::from(u8::from(reference == seed)), "{}", name(*seed));
+            }
+        }
+        assert!(!is_input(u32::try_from(INPUTS).unwrap()));
+    }
 }

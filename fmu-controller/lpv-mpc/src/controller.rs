@@ -145,21 +145,41 @@ impl Controller {
     /// # Errors
     /// [`Error::Step`] for a step that is not positive and finite; the controller is as before then.
     pub fn advance(&mut self, t: f64, h: f64, inputs: &Inputs) -> Result<(), Error> {
+        self.advance_with(t, h, |_| (0.0, inputs.clone()))
+    }
+
+    /// Like [`advance`](Self::advance), with inputs that change at `rates` (each per second) within the step: a sample inside
+    /// the step then sees what is measured at its own time.
+    ///
+    /// # Errors
+    /// See [`advance`](Self::advance).
+    pub fn advance_along(&mut self, t: f64, h: f64, inputs: &Inputs, rates: &Inputs) -> Result<(), Error> {
+        self.advance_with(t, h, |age| (age, inputs.moved(rates, age)))
+    }
+
+    /// Takes the samples of a step; `measure` says, for a time since the start of the step [s], how long after the start the
+    /// measurement that the sample uses is taken [s], and what it is.
+    fn advance_with(&mut self, t: f64, h: f64, measure: impl Fn(f64) -> (f64, Inputs)) -> Result<(), Error> {
         if !(h > 0.0 && h.is_finite() && t.is_finite()) {
             return Err(Error::Step(h));
         }
         self.sampled = 0;
         let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);
-        while self.start + self.samples as f64 * self.parameters.t_s < end {
+        loop {
+            let due = self.start + self.samples as f64 * self.parameters.t_s;
+            if due >= end {
+                return Ok(());
+            }
             self.samples += 1;
             self.sampled += 1;
-            self.sample(t, h, inputs);
+            let (age, inputs) = measure((due - t).max(0.0));
+            self.sample(t + age, h - age, &inputs);
             self.latency.send(t + h, self.u_prev);
         }
-        Ok(())
     }
 
-    /// One sample with what was measured at `t` [s]: estimate, predict over the latency, plan, take the first command.
+    /// One sample with what was measured at `t` [s], whose command is visible after `h` [s]: estimate, predict over the
+    /// latency, plan, take the first command.
     fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
         let (duration, delivered) = self.latency.advance(t);
         self.snapshot.inputs.clone_from(inputs);

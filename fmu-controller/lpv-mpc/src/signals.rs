@@ -49,6 +49,21 @@ impl Default for Inputs {
 }
 
 impl Inputs {
+    /// These inputs after `duration` [s] of change at `rates` (each per second).
+    #[must_use]
+    pub fn moved(&self, rates: &Self, duration: f64) -> Self {
+        Self {
+            v_x: self.v_x + duration * rates.v_x,
+            v_y: self.v_y + duration * rates.v_y,
+            yaw_rate: self.yaw_rate + duration * rates.yaw_rate,
+            e_y: self.e_y + duration * rates.e_y,
+            e_psi: self.e_psi + duration * rates.e_psi,
+            kappa_ref: self.kappa_ref + rates.kappa_ref * duration,
+            v_x_ref: self.v_x_ref + rates.v_x_ref * duration,
+            hold_preview: self.hold_preview,
+        }
+    }
+
     /// The measured state.
     pub fn state(&self) -> State {
         let mut x = State::zeros();
