@@ -24,6 +24,9 @@ pub(crate) fn check<M: Model>(table: &Table<M>, start: &M) -> Result<(), Error> 
         if row.kind == Kind::Integer && [row.min, row.max].into_iter().flatten().any(|bound| bound.fract() != 0.0) {
             return Err(contradiction(row, "is an integer, but its limits are not"));
         }
+        if row.nominal.is_some_and(|nominal| nominal <= 0.0) {
+            return Err(contradiction(row, "has a nominal value that is not positive"));
+        }
         if !row.role.is_calculated() && !row.permits(row.read(start, element)) {
             return Err(contradiction(row, "starts outside of its range"));
         }

@@ -170,17 +170,18 @@ def check_extreme_inputs_are_survived(fmu):
         for k in range(5, 15):
             for variable in inputs:
                 low, high = variable.bound("min"), variable.bound("max")
-                extremes = [0.0, -1e-308, 1e-3, -30.0, -1e300 if low is None else low, 1e300 if high is None else high]
-                assert slave.set(variable.name, generator.choice(extremes)) == OK
+                low, high = -1e300 if low is None else low, 1e300 if high is None else high
+                value = generator.choice([0.0, -1e-308, 1e-3, -30.0, low, high])
+                assert slave.set(variable.name, min(max(value, low), high)) == OK
             status = slave.step(k * 0.01, 0.01)
             assert status in (OK, WARNING, ERROR)
             if status == ERROR:
                 break
-            assert all(math.isfinite(value) for value in slave.reals(fmu.outputs())), "a number came out that is none"
+            assert not_finite(slave) == []
         else:
             # After inputs that were bad but legal, good ones must be good enough again.
             slave.run(15, 40)
-            assert all(math.isfinite(value) for value in slave.reals(fmu.outputs()))
+            assert not_finite(slave) == []
         assert slave.Reset() == OK
         slave.free()
 
@@ -194,7 +195,16 @@ def check_irregular_steps_are_taken(fmu):
         assert slave.step(t, h) in (OK, WARNING), (t, h, slave.messages[-1:])
         t += h
         assert slave.last_time() == t
-    assert all(math.isfinite(value) for value in slave.reals(fmu.outputs()))
+    assert not_finite(slave) == []
+
+
+def not_finite(slave):
+    """Names of the outputs that are no numbers."""
+    outputs = slave.fmu.outputs()
+    # Without a plan the controller's quality figures are infinite, which is what they mean.
+    wanted = {"kkt_residual": (math.inf,), "slack_e_y": (math.inf,)}
+    values = zip(outputs, slave.reals(outputs))
+    return [output.name for output, value in values if not math.isfinite(value) and value not in wanted.get(output.name, ())]
 
 
 def check_values_outside_of_their_range_are_refused(fmu):

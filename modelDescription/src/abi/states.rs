@@ -7,30 +7,55 @@ use super::c::*;
 use super::call;
 use super::pointers::{input, output, place};
 use crate::error::Error;
+use crate::guid;
 use crate::lifecycle as of;
 use crate::model::Model;
 use crate::state::State;
 
+/// What a handle points at.
+#[repr(C)]
+struct Saved<M: Model> {
+    /// Tells the states of this model from those of others, from freed ones and from other memory: not in every case, which no
+    /// pointer could, but in those that careless importers produce.
+    mark: u64,
+    state: State<M>,
+}
+
+fn mark<M: Model>() -> u64 {
+    let guid = guid::guid::<M>().as_bytes();
+    guid.iter().fold(u64::from_le_bytes(*b"FMUSTATE"), |mark, byte| mark.rotate_left(7) ^ u64::from(*byte))
+}
+
 /// The state behind an importer's handle.
-unsafe fn saved<'a, M: Model>(state: FmuState) -> Result<&'a mut State<M>, Error> {
-    // SAFETY: FMI 2.0.4, section 2.1.8: a state is NULL or was returned by this FMU and not freed.
-    unsafe { place("FMUstate", state.cast()) }
+unsafe fn saved<'a, M: Model>(state: FmuState) -> Result<&'a mut Saved<M>, Error> {
+    let pointer = state.cast::<Saved<M>>();
+    let refused = || Error::State("the pointer is none that this FMU returned, or it was freed".to_owned());
+    // SAFETY: FMI 2.0.4, section 2.1.8: a state is NULL or was returned by an FMU, so its first 8 bytes can be read.
+    let is_ours =
+        pointer.is_null() || (pointer.is_aligned() && unsafe { (&raw const (*pointer).mark).read() } == mark::<M>());
+    if !is_ours {
+        return Err(refused());
+    }
+    // SAFETY: the mark says that it is one of ours.
+    unsafe { place("FMUstate", pointer) }
 }
 
 /// Hands a state to the importer: into the one that its handle already names, or as a new one.
-unsafe fn hand_over<M: Model>(handle: &mut FmuState, state: State<M>) {
-    // SAFETY: FMI 2.0.4, section 2.1.8: a handle that is not NULL names a state that this FMU returned and may be overwritten.
-    match unsafe { handle.cast::<State<M>>().as_mut() } {
-        Some(known) => *known = state,
-        None => *handle = Box::into_raw(Box::new(state)).cast(),
+unsafe fn hand_over<M: Model>(handle: &mut FmuState, state: State<M>) -> Result<(), Error> {
+    if handle.is_null() {
+        *handle = Box::into_raw(Box::new(Saved { mark: mark::<M>(), state })).cast();
+    } else {
+        // SAFETY: FMI 2.0.4, section 2.1.8: a handle that is not NULL names a state that this FMU returned and may be overwritten.
+        unsafe { saved::<M>(*handle) }?.state = state;
     }
+    Ok(())
 }
 
 pub unsafe fn get_fmu_state<M: Model>(component: Component, state: *mut FmuState) -> Status {
     // SAFETY: the caller's promise.
     unsafe {
         call::<M>(component, &of::GET_FMU_STATE, |slave| {
-            hand_over(place("FMUstate", state)?, slave.state.clone());
+            hand_over(place("FMUstate", state)?, slave.state.clone())?;
             Ok(Status::Ok)
         })
     }
@@ -40,7 +65,7 @@ pub unsafe fn set_fmu_state<M: Model>(component: Component, state: FmuState) -> 
     // SAFETY: the caller's promise.
     unsafe {
         call::<M>(component, &of::SET_FMU_STATE, |slave| {
-            slave.restore(saved(state)?.clone());
+            slave.restore(saved(state)?.state.clone());
             Ok(Status::Ok)
         })
     }
@@ -52,7 +77,10 @@ pub unsafe fn free_fmu_state<M: Model>(component: Component, state: *mut FmuStat
         call::<M>(component, &of::FREE_FMU_STATE, |_| {
             let handle = place("FMUstate", state)?;
             if !handle.is_null() {
-                drop(Box::from_raw(handle.cast::<State<M>>()));
+                let saved = saved::<M>(*handle)?;
+                // Volatile, because the compiler sees no reader; a second free through a copy of the handle is one.
+                (&raw mut saved.mark).write_volatile(0);
+                drop(Box::from_raw(saved));
                 *handle = ptr::null_mut();
             }
             Ok(Status::Ok)
@@ -64,7 +92,7 @@ pub unsafe fn serialized_fmu_state_size<M: Model>(component: Component, state: F
     // SAFETY: the caller's promise.
     unsafe {
         call::<M>(component, &of::SERIALIZED_FMU_STATE_SIZE, |_| {
-            *place("size", size)? = saved::<M>(state)?.to_bytes()?.len();
+            *place("size", size)? = saved::<M>(state)?.state.to_bytes()?.len();
             Ok(Status::Ok)
         })
     }
@@ -79,7 +107,7 @@ pub unsafe fn serialize_fmu_state<M: Model>(
     // SAFETY: the caller's promise.
     unsafe {
         call::<M>(component, &of::SERIALIZE_FMU_STATE, |_| {
-            let saved = saved::<M>(state)?.to_bytes()?;
+            let saved = saved::<M>(state)?.state.to_bytes()?;
             let bytes = output("serializedState", bytes, size)?;
             let target = bytes.get_mut(..saved.len()).ok_or(Error::Size { name: "size", size })?;
             target.copy_from_slice(&saved);
@@ -98,7 +126,7 @@ pub unsafe fn deserialize_fmu_state<M: Model>(
     unsafe {
         call::<M>(component, &of::DESERIALIZE_FMU_STATE, |_| {
             let handle = place("FMUstate", state)?;
-            hand_over(handle, State::<M>::from_bytes(input("serializedState", bytes, size)?)?);
+            hand_over(handle, State::<M>::from_bytes(input("serializedState", bytes, size)?)?)?;
             Ok(Status::Ok)
         })
     }

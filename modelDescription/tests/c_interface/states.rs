@@ -57,6 +57,23 @@ fn a_state_is_overwritten_when_its_handle_is_passed_again() {
 }
 
 #[test]
+fn memory_that_is_no_state_is_refused() {
+    let slave = Slave::started(&guid(), 0.0);
+    let mut memory = [7_u64; 512];
+    let mut state: State = memory.as_mut_ptr().cast();
+    let mut size = 0;
+    unsafe {
+        assert_eq!(fmi2SetFMUstate(slave.component, state), ERROR);
+        assert_eq!(fmi2GetFMUstate(slave.component, &raw mut state), ERROR);
+        assert_eq!(fmi2SerializedFMUstateSize(slave.component, state, &raw mut size), ERROR);
+        assert_eq!(fmi2FreeFMUstate(slave.component, &raw mut state), ERROR);
+        assert_eq!(fmi2SetFMUstate(slave.component, state.byte_add(1)), ERROR, "not even aligned");
+    }
+    assert_eq!(memory, [7; 512]);
+    assert_eq!(slave.step(0.0, 0.1), OK);
+}
+
+#[test]
 fn a_state_from_before_an_error_revives_the_instance() {
     let slave = Slave::started(&guid(), 0.0);
     run(&slave, 0, 5);
