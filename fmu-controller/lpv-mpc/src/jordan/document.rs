@@ -71,10 +71,16 @@ pub struct Provenance {
     pub tyre: String,
     /// Smallest and largest friction of the training [1].
     pub mu: [f64; 2],
+    /// Sensor noise on the inputs of the training, in the plant's units [1].
+    pub noise: f64,
+    /// Largest wind of the training [m/s].
+    pub wind: f64,
     /// Seed of manoeuvres and initial weights.
     pub seed: u64,
-    /// Training manoeuvres before mirroring.
+    /// Training manoeuvres within 90 % of grip, before mirroring.
     pub manoeuvres: usize,
+    /// Training manoeuvres beyond, before mirroring.
+    pub beyond: usize,
     /// SHA-256 of the training data.
     pub data: String,
 }

@@ -40,8 +40,11 @@ fn random(seed: u64, sizes: &[usize]) -> Document {
             preset: "test".to_owned(),
             tyre: "dry_asphalt".to_owned(),
             mu: [0.82, 0.82],
+            noise: 0.0,
+            wind: 0.0,
             seed,
             manoeuvres: 0,
+            beyond: 0,
             data: String::new(),
         },
     }
