@@ -34,7 +34,7 @@ def check_null_arrays_are_refused_with_one_message_each(fmu):
 
 def check_null_text_is_refused(fmu):
     slave = fmu.slave()
-    fmu.unusable()
+    assert fmu.named("parameter", "String")
     for variable in fmu.named("parameter", "String"):
         slave.messages.clear()
         assert slave.SetString(byref(c_uint(variable.reference)), 1, byref(c_char_p(None))) == ERROR
@@ -89,8 +89,7 @@ def check_instantiation_refuses_what_is_wrong(fmu):
 
 def check_percent_signs_reach_the_logger_doubled(fmu):
     slave = fmu.slave(name="100%s%n")
-    name, _ = fmu.unusable()
-    assert slave.set(name, "100%s%n%d nowhere") == OK
+    slave.spoil("100%s%n%d nowhere")
     slave.setup()
     slave.messages.clear()
     assert slave.initialize() == ERROR

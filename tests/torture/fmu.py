@@ -14,10 +14,6 @@ OK, WARNING, DISCARD, ERROR = range(4)
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
-class NotApplicable(Exception):
-    """The archive has nothing that the check could check."""
-
-
 class Callbacks(ctypes.Structure):
     _fields_ = [
         ("logger", LOGGER),
@@ -112,13 +108,6 @@ class Fmu:
         """The outputs that must repeat bit by bit: all but the one that a clock on the wall measures."""
         return [v for v in self.named("output", "Real") if v.name != "solve_time"]
 
-    def unusable(self):
-        """A parameter and a value that pass the interface and that initialisation refuses: a file that is not there."""
-        texts = self.named("parameter", "String")
-        if not texts:
-            raise NotApplicable("this FMU has no parameter whose value only initialisation can refuse")
-        return texts[0].name, "/nowhere/at all"
-
     def slave(self, **settings):
         return Slave(self, **settings)
 
@@ -149,6 +138,13 @@ class Slave:
     def __getattr__(self, name):
         function = getattr(self.fmu.library, f"fmi2{name}")
         return lambda *arguments: function(self.component, *arguments)
+
+    def spoil(self, text="/nowhere/at all"):
+        """Sets parameters that pass the interface and that initialisation refuses: a file that is not there, and the wish to use it."""
+        name = self.fmu.named("parameter", "String")[-1].name
+        assert self.set(name, text) == OK
+        if name == "network_file":
+            assert self.set("adaptation", 1) == OK
 
     def errors(self):
         """The texts of the error messages since the last call."""

@@ -2,6 +2,7 @@
 
 import ctypes
 import locale
+import math
 import os
 import pathlib
 import shutil
@@ -55,7 +56,7 @@ def check_the_process_stays_as_it_was(fmu):
     slave = fmu.started()
     slave.run(0, 50)
     broken = fmu.slave()
-    broken.set(*fmu.unusable())
+    broken.spoil()
     broken.setup()
     assert broken.initialize() == ERROR
     broken.free(), slave.free()
@@ -208,7 +209,7 @@ def check_input_derivatives_belong_to_one_step(fmu):
     assert slave.SetRealInputDerivatives(byref(c_uint(output.reference)), 1, order, slope) == ERROR
     if possible:
         plain = fmu.started()
-        steep, flat = slave.run(0, 5), plain.run(0, 5)
+        steep, flat = slave.run(0, 3, h=0.1), plain.run(0, 3, h=0.1)
         assert steep != flat, "the derivative acts"
 
 
@@ -237,33 +238,56 @@ def check_output_derivatives_agree_with_differences(fmu):
         assert abs((after - before) / h - slope) < 1e-2 + 1e-3 * abs(slope), (name, slope, (after - before) / h)
 
 
-def check_directional_derivatives_agree_with_differences(fmu):
-
-    inputs, outputs = fmu.named("input", "Real"), fmu.outputs()
-    known, one, sensitivity = (c_uint * 1)(inputs[0].reference), (c_double * 1)(1.0), (c_double * 1)()
+def check_directional_derivatives_are_refused_where_they_do_not_exist(fmu):
+    known, unknown = fmu.named("input", "Real")[0], fmu.outputs()[0]
     slave = fmu.started()
-    slave.run(0, 50)
-    unknown = (c_uint * 1)(outputs[0].reference)
+    if fmu.can("providesDirectionalDerivative"):
+        assert slope(slave, known, known) is None, "an input is no unknown"
+        assert slope(slave, unknown, unknown) is None, "an output is no known"
+    else:
+        assert slope(slave, unknown, known) is None
+
+
+def check_directional_derivatives_agree_with_differences(fmu):
     if not fmu.can("providesDirectionalDerivative"):
-        assert slave.GetDirectionalDerivative(unknown, 1, known, 1, one, sensitivity) == ERROR
         return
-    assert slave.GetDirectionalDerivative(known, 1, known, 1, one, sensitivity) == ERROR, "an input is no unknown"
-    assert slave.GetDirectionalDerivative(unknown, 1, unknown, 1, one, sensitivity) == ERROR, "an output is no known"
-    found = 0
-    for variable in inputs:
-        _, value = slave.get(variable.name)
-        known[0], h = variable.reference, 1e-5
-        nearby = []
-        for shift in (h, -h, 0.0):
-            assert slave.set(variable.name, value + shift) == OK
-            nearby.append(slave.reals(outputs))
-        above, below, _ = nearby
+    # The controller's command belongs to the inputs of its last sample; the plant's outputs follow its inputs at once.
+    sampled = "t_s" in fmu.variables
+    h = float(fmu.variables["t_s"].attributes["start"]) if sampled else 0.01
+    slave, outputs, t = fmu.started(), fmu.outputs(), 30 * h
+    slave.run(0, 30, h)
+    slave.excite(t)
+    before = slave.save()
+
+    def react(variable, value):
+        assert slave.SetFMUstate(before) == OK
+        assert slave.set(variable.name, value) == OK
+        if sampled:
+            assert slave.step(t, h) == OK
+        return slave.reals(outputs)
+
+    acting = 0
+    for variable in fmu.named("input", "Real"):
+        assert slave.SetFMUstate(before) == OK
+        value, small = slave.get(variable.name)[1], 1e-4
+        above, below = react(variable, value + small), react(variable, value - small)
+        react(variable, value)
         for output, upper, lower in zip(outputs, above, below):
-            unknown[0] = output.reference
-            assert slave.GetDirectionalDerivative(unknown, 1, known, 1, one, sensitivity) == OK, slave.messages
-            difference = (upper - lower) / (2 * h)
-            close = abs(sensitivity[0] - difference) <= 1e-4 * max(abs(difference), abs(upper), 1.0)
-            # At a point where nothing reacts at once, the controller differentiates its next command instead.
-            assert close or difference == 0.0, (output.name, variable.name, sensitivity[0], difference)
-            found += difference != 0.0
-    assert found or not fmu.can("canInterpolateInputs")
+            # How the solver fared is no function that one could differentiate.
+            if output.name in ("kkt_residual", "slack_e_y"):
+                continue
+            difference, exact = (upper - lower) / (2 * small), slope(slave, output, variable)
+            # Third derivatives and the solver's tolerance stay below these in the second and the first term.
+            close = abs(exact - difference) <= 1e-3 * abs(difference) + 1e-5 * max(1.0, abs(upper))
+            assert close, (output.name, variable.name, exact, difference)
+            acting += abs(difference) > 1e-3
+    assert acting > 5, "nothing was compared"
+    slave.release(before)
+
+
+def slope(slave, unknown, known):
+    """Derivative of one variable along another, or None if it is refused."""
+    one, sensitivity = c_double(1.0), c_double(math.nan)
+    references = byref(c_uint(unknown.reference)), 1, byref(c_uint(known.reference)), 1
+    status = slave.GetDirectionalDerivative(*references, byref(one), byref(sensitivity))
+    return sensitivity.value if status == OK else None
