@@ -7,6 +7,7 @@ mod variables;
 use std::time::Instant;
 
 use error::Error;
+use lpv_mpc::adaptation::other_car;
 use lpv_mpc::{Adaptation, Controller, Inputs, Output, Parameters, Status};
 use model_description::{Category, Experiment, Info, InputDerivative, Log, Model, Outcome, Step, Table};
 use serde::{Deserialize, Serialize};
@@ -27,12 +28,12 @@ pub struct LpvMpcController {
 
 impl Default for LpvMpcController {
     fn default() -> Self {
-        let parameters = Parameters::default();
-        let controller = Controller::new(parameters.clone(), 0.0).expect("a test shows that the defaults are valid");
+        // Until initialisation nothing is known of the network.
+        let controller = Controller::new(Parameters::default(), 0.0).expect("a test shows that the defaults are valid");
         Self {
             output: controller.output().clone(),
             controller,
-            parameters,
+            parameters: Parameters::adaptive(),
             network_file: String::new(),
             inputs: Inputs::default(),
             solve_time: 0.0,
@@ -66,8 +67,9 @@ impl Model for LpvMpcController {
             Controller::new(parameters, experiment.start)?
         } else {
             let network = network::load(&self.network_file, experiment.resources)?;
-            if let Some(difference) = network::difference(&network, &parameters) {
-                log.log(Category::Warning, &format!("the network was trained for another car: {difference}"));
+            if let Some(difference) = other_car(&network, &parameters) {
+                let reason = format!("the network is of another car, the stiffnesses stay nominal: {difference}");
+                log.log(Category::Warning, &reason);
             }
             Controller::with_network(parameters, experiment.start, network)?
         };

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use lpv_mpc::Parameters;
-use lpv_mpc::jordan::{Document, Network};
+use lpv_mpc::jordan::Network;
 use model_description::read_file;
 
 use crate::error::Error;
@@ -14,9 +13,6 @@ const BUILT_IN: &str = include_str!("../resources/jordan.json");
 /// Longest network file [bytes]: a net of the largest width has some thousand numbers of twenty characters.
 const SIZE_MAX: u64 = 4 << 20;
 
-/// Relative difference of a car's parameter from which on a network is not its own [1].
-const SAME_CAR: f64 = 0.01;
-
 /// The network in `file`, or the built-in one when that is empty.
 pub fn load(file: &str, resources: Option<&Path>) -> Result<Network, Error> {
     if file.trim().is_empty() {
@@ -26,30 +22,19 @@ pub fn load(file: &str, resources: Option<&Path>) -> Result<Network, Error> {
     Network::from_json(&text).map_err(|reason| Error::Network { path, reason })
 }
 
-/// Where the car that the network was trained for differs from the parameters.
-pub fn difference(network: &Network, p: &Parameters) -> Option<String> {
-    let Document { l_f, l_r, c_f_nominal, c_r_nominal, .. } = network.document();
-    [
-        ("l_f", l_f, p.l_f),
-        ("l_r", l_r, p.l_r),
-        ("c_f_nominal", c_f_nominal, p.c_f_nominal),
-        ("c_r_nominal", c_r_nominal, p.c_r_nominal),
-    ]
-    .into_iter()
-    .find(|(_, trained, given)| (*trained - given).abs() > SAME_CAR * *trained)
-    .map(|(name, trained, given)| format!("{name} was {trained}, it is {given} here"))
-}
-
 #[cfg(test)]
 mod tests {
+    use lpv_mpc::Parameters;
+    use lpv_mpc::adaptation::other_car;
+
     use super::*;
 
     #[test]
     fn built_in_network_is_of_the_default_car() {
         let network = load("", None).unwrap();
-        assert_eq!(difference(&network, &Parameters::default()), None);
+        assert_eq!(other_car(&network, &Parameters::default()), None);
         let other = Parameters { l_f: 1.5, ..Parameters::default() };
-        assert_eq!(difference(&network, &other).unwrap(), "l_f was 1.2, it is 1.5 here");
+        assert_eq!(other_car(&network, &other).unwrap(), "l_f was 1.2, it is 1.5 here");
     }
 
     #[test]

@@ -7,7 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::jordan::{Belief, Measured, Memory, Network};
+use crate::Parameters;
+use crate::jordan::{Belief, Document, Measured, Memory, Network};
 use crate::model::{A_X, DELTA, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE};
 use crate::mpc::TyreModel;
 use crate::parameters::Adaptation;
@@ -17,6 +18,23 @@ use crate::parameters::Adaptation;
 /// Beyond the peak the tangent is negative, and a plan with such a model runs away from what it was made around. With the true
 /// curve of the default tyre in place of the network, the lane change at 17 m/s stays within 11 cm at this floor.
 const TANGENT_FLOOR: f64 = 0.05;
+
+/// Relative difference of a parameter from which on a car is not the one that a network was trained for [1].
+const SAME_CAR: f64 = 0.01;
+
+/// Where the car that a network was trained for differs from the one of the parameters; nothing if it is the same car.
+pub fn other_car(network: &Network, p: &Parameters) -> Option<String> {
+    let Document { l_f, l_r, c_f_nominal, c_r_nominal, .. } = network.document();
+    [
+        ("l_f", *l_f, p.l_f),
+        ("l_r", *l_r, p.l_r),
+        ("c_f_nominal", *c_f_nominal, p.c_f_nominal),
+        ("c_r_nominal", *c_r_nominal, p.c_r_nominal),
+    ]
+    .into_iter()
+    .find(|(_, trained, given)| (trained - given).abs() > SAME_CAR * trained)
+    .map(|(name, trained, given)| format!("{name} was {trained}, it is {given} here"))
+}
 
 /// Tyres by the mode of adaptation, with the network's memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -35,12 +53,13 @@ pub struct Adapter {
 }
 
 impl Adapter {
-    /// Nothing measured yet: the nominal tyres. Without a network they stay, whatever the mode.
-    pub fn new(mode: Adaptation, nominal: Tyres, network: Option<Network>) -> Self {
+    /// Nothing measured yet: the nominal tyres. Without a network, or with that of another car, they stay.
+    pub fn new(p: &Parameters, network: Option<Network>) -> Self {
+        let nominal = p.nominal_tyres();
+        let network = network.filter(|network| other_car(network, p).is_none());
         let memory = network.as_ref().map_or_else(Memory::default, Network::nominal);
-        let mode = if network.is_some() { mode } else { Adaptation::Constant };
         Self {
-            mode,
+            mode: if network.is_some() { p.adaptation } else { Adaptation::Constant },
             nominal,
             network,
             memory,

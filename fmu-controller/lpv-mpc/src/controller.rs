@@ -76,7 +76,8 @@ impl Controller {
         Self::build(parameters, start, None)
     }
 
-    /// A controller that may adapt its tyres by a trained network.
+    /// A controller that may adapt its tyres by a trained network. That of another car ([`crate::adaptation::other_car`]) is
+    /// not used: the nominal tyres stay.
     ///
     /// # Errors
     /// [`Error::Parameter`] names the first parameter outside its range.
@@ -90,7 +91,7 @@ impl Controller {
         let tau = [p.tau_delta, p.tau_a_x];
         let tyres = p.nominal_tyres();
         Ok(Self {
-            beliefs: Beliefs { body: p.body(), tyres: Adapter::new(p.adaptation, tyres, network) },
+            beliefs: Beliefs { body: p.body(), tyres: Adapter::new(p, network) },
             estimator: Estimator::new(p.sensor_noise),
             blind: 0,
             core: if tau == [0.0, 0.0] {

@@ -144,6 +144,13 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// The defaults with the network along the horizon: what ships, where a network is at hand.
+    ///
+    /// 40 periods are 1.3 s: at the limit of grip the plan has to see that far, and the tyre has to be right along all of it.
+    pub fn adaptive() -> Self {
+        Self { adaptation: Adaptation::NetworkHorizon, horizon: HORIZON_MAX, ..Self::default() }
+    }
+
     /// The paper's own tuning: Table 2 of [Kebbati] and the weights that its tuner found, the measurement taken as it is.
     pub fn paper() -> Self {
         Self {
@@ -270,6 +277,7 @@ mod tests {
     #[test]
     fn defaults_are_valid() {
         assert_eq!(Parameters::default().validate(), Ok(()));
+        assert_eq!(Parameters::adaptive().validate(), Ok(()));
         assert_eq!(Parameters::paper().validate(), Ok(()));
     }
 

@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
-use lpv_mpc::Controller;
+use lpv_mpc::jordan::Network;
+use lpv_mpc::{Adaptation, Controller};
 use vehicle::{Road, Vehicle};
 
 use crate::archive::{read_text, write_whole};
@@ -79,11 +80,17 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     save(args, &settings, &recording, output)
 }
 
+/// The network that ships in the controller's FMU.
+const NETWORK: &str = include_str!("../../../fmu-controller/resources/jordan.json");
+
 /// The two sides as the settings say.
 pub fn build(settings: &Settings) -> Result<(Vehicle, Controller)> {
     let road = road(&settings.road, &settings.plant)?;
     let plant = Vehicle::new(settings.plant.clone(), road)?;
-    let controller = Controller::new(settings.controller.clone(), 0.0)?;
+    let controller = match settings.controller.adaptation {
+        Adaptation::Constant => Controller::new(settings.controller.clone(), 0.0)?,
+        _ => Controller::with_network(settings.controller.clone(), 0.0, Network::from_json(NETWORK)?)?,
+    };
     Ok((plant, controller))
 }
 

@@ -23,7 +23,7 @@ impl Settings {
     pub fn new(road: &str, assignments: &[String]) -> Result<Self> {
         let mut road = road.to_owned();
         let mut plant = fields(&vehicle::Parameters::default())?;
-        let mut controller = fields(&lpv_mpc::Parameters::default())?;
+        let mut controller = fields(&lpv_mpc::Parameters::adaptive())?;
         let mut own_preview = false;
         for assignment in assignments {
             let (name, value) =
