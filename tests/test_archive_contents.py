@@ -31,6 +31,7 @@ def test_fmutool_finds_no_problem(archive):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     log = done.stdout + done.stderr
     assert done.returncode == 0, log
+    assert "compliant with FMI-2.0" in log and "No semantic error" in log, log
     assert not any(word in log for word in ("ERROR", "WARNING", "Traceback")), log
 
 

@@ -38,6 +38,7 @@ pub struct Cli {
 #[derive(Clone, Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
+    Merge(pack::merge::Args),
     Pack(pack::Args),
     Simulate(simulate::Args),
 }
@@ -48,6 +49,7 @@ impl Cli {
         let output = Output::default();
         match &self.command {
             Command::Demo(args) => demo::run(args, &output),
+            Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
         }

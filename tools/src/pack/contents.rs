@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use super::documentation;
 use super::licenses::Metadata;
+use super::platform::Platform;
 use crate::archive::{Files, read};
 use crate::interface::Interface;
 use crate::workspace::{self, Model};
@@ -14,8 +15,13 @@ use crate::workspace::{self, Model};
 const NO_RESOURCES: &str =
     "The model reads nothing from here unless a parameter names a file: a bare file name is looked for here first.\n";
 
-/// Collects a model's files; `libraries` are pairs of platform folder and file.
-pub fn of(model: Model, interface: &Interface, libraries: &[(&str, PathBuf)], packages: &Metadata) -> Result<Files> {
+/// Collects a model's files; `libraries` are built for a platform each.
+pub fn of(
+    model: Model,
+    interface: &Interface,
+    libraries: &[(Platform, PathBuf)],
+    packages: &Metadata,
+) -> Result<Files> {
     let mut files = Files::default();
     files.add("modelDescription.xml", read(&model.description_file())?)?;
     let terminals = model.description_file().with_extension("terminals.xml");
@@ -23,11 +29,7 @@ pub fn of(model: Model, interface: &Interface, libraries: &[(&str, PathBuf)], pa
         files.add("terminalsAndIcons/terminalsAndIcons.xml", read(&terminals)?)?;
     }
     for (platform, library) in libraries {
-        let extension = library
-            .extension()
-            .and_then(|extension| extension.to_str())
-            .with_context(|| format!("{} has no extension", library.display()))?;
-        let path = format!("binaries/{platform}/{}.{extension}", model.identifier);
+        let path = format!("binaries/{}/{}.{}", platform.folder(), model.identifier, platform.extension());
         files.add(&path, read(library)?)?;
     }
     let folder = workspace::root().join(model.folder);

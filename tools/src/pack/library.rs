@@ -1,11 +1,13 @@
 //! Cargo builds the libraries; each is then loaded once, to see that it is the one that the XML describes.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 
+use super::platform::{GLIBC, Platform, newest_glibc};
+use crate::archive::read;
 use crate::importer::Fmu;
 use crate::interface::Interface;
 use crate::workspace::{self, Model};
@@ -24,11 +26,12 @@ struct Target {
 }
 
 /// Builds the libraries in release mode and returns their paths in the same order.
-pub fn build(models: &[Model]) -> Result<Vec<PathBuf>> {
-    // Under `cargo run`, the variable names the very cargo that started this program.
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
+pub fn build(models: &[Model], platform: Platform) -> Result<Vec<PathBuf>> {
+    if let Some(what) = platform.missing() {
+        bail!("no toolchain for {}: {what}", platform.folder());
+    }
+    let mut command = platform.cargo();
+    command.args(["--release", "--quiet", "--message-format=json-render-diagnostics"]);
     for model in models {
         command.args(["--package", model.package]);
     }
@@ -44,14 +47,14 @@ pub fn build(models: &[Model]) -> Result<Vec<PathBuf>> {
     models
         .iter()
         .map(|model| {
-            find(&messages, model.identifier)
+            find(&messages, model.identifier, platform.extension())
                 .with_context(|| format!("cargo built no library {} from {}", model.identifier, model.package))
         })
         .collect()
 }
 
 /// Cargo itself says where the library lies, so that any target folder works.
-fn find(messages: &str, identifier: &str) -> Option<PathBuf> {
+fn find(messages: &str, identifier: &str, extension: &str) -> Option<PathBuf> {
     messages
         .lines()
         .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
@@ -60,7 +63,18 @@ fn find(messages: &str, identifier: &str) -> Option<PathBuf> {
         })
         .flat_map(|artifact| artifact.filenames)
         // Windows adds an import library and debug symbols, which no FMU needs.
-        .find(|file| file.extension().and_then(|extension| extension.to_str()) == Some(std::env::consts::DLL_EXTENSION))
+        .find(|file| file.extension().is_some_and(|found| found == extension))
+}
+
+/// Refuses a library that would not load on the systems that it is meant for.
+pub fn ensure_portable(library: &Path) -> Result<()> {
+    let newest = newest_glibc(&read(library)?);
+    ensure!(
+        newest.is_none_or(|newest| newest <= GLIBC),
+        "{} asks for glibc {newest:?}, newer than {GLIBC:?}",
+        library.display()
+    );
+    Ok(())
 }
 
 /// Loads the library and asks it to instantiate with the fingerprint of the XML.
@@ -91,13 +105,13 @@ mod tests {
 
     #[test]
     fn the_library_is_found_among_the_messages_of_cargo() {
-        let file = format!("/t/libvehicle_plant.{}", std::env::consts::DLL_EXTENSION);
+        let file = "/t/libvehicle_plant.so";
         let messages = format!(
             "{{\"reason\":\"build-script-executed\"}}\n\
              {{\"target\":{{\"name\":\"vehicle_plant\",\"kind\":[\"lib\"]}},\"filenames\":[\"/t/x.rlib\"]}}\n\
              {{\"target\":{{\"name\":\"vehicle_plant\",\"kind\":[\"cdylib\"]}},\"filenames\":[\"/t/x.lib\",\"{file}\"]}}\n"
         );
-        assert_eq!(find(&messages, "vehicle_plant"), Some(PathBuf::from(file)));
-        assert_eq!(find(&messages, "lpv_mpc_controller"), None);
+        assert_eq!(find(&messages, "vehicle_plant", "so"), Some(PathBuf::from(file)));
+        assert_eq!(find(&messages, "lpv_mpc_controller", "so"), None);
     }
 }

@@ -4,16 +4,19 @@ mod contents;
 mod documentation;
 mod library;
 mod licenses;
+pub mod merge;
+pub mod platform;
 mod reference;
 mod system;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Parser;
 
+use platform::Platform;
+
 use crate::archive::{Files, read_text};
-use crate::importer::platform;
 use crate::interface::Interface;
 use crate::output::Output;
 use crate::workspace::{self, CONTROLLER, Model, PLANT};
@@ -22,7 +25,18 @@ use crate::workspace::{self, CONTROLLER, Model, PLANT};
 ///
 /// The archives land in target/fmu/. The same sources give the same bytes.
 #[derive(Clone, Debug, Default, Parser)]
-pub struct Args {}
+#[command(after_help = "\
+Examples:
+  cargo fmu pack               for this machine
+  cargo fmu pack --portable    to hand on: any 64-bit Linux of the last decade, and Windows if its toolchain is there
+  tools/cross-toolchain        prepares what --portable needs
+
+Archives that were built on different machines are united by cargo fmu merge.")]
+pub struct Args {
+    /// Build for linux64 with glibc 2.17 or newer and for win64, into the same archives
+    #[arg(long)]
+    pub portable: bool,
+}
 
 /// The finished archives.
 #[derive(Clone, Debug)]
@@ -36,8 +50,16 @@ pub struct Packed {
 }
 
 /// Runs the command.
-pub fn run(_args: &Args, output: &Output) -> Result<()> {
-    let packed = pack(output)?;
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let mut platforms = vec![Platform::Host];
+    if args.portable {
+        platforms = vec![Platform::PortableLinux, Platform::Windows];
+        if let Some(what) = Platform::Windows.missing() {
+            output.line(&format!("WITHOUT WINDOWS: there is no toolchain for win64 here, {what}"));
+            platforms.pop();
+        }
+    }
+    let packed = pack_for(&platforms, output)?;
     for path in [&packed.controller, &packed.plant, &packed.system] {
         let size = path.metadata()?.len();
         output.line(&format!("{:<34} {:>7.1} kB", workspace::shown(path), size as f64 / 1e3));
@@ -45,19 +67,32 @@ pub fn run(_args: &Args, output: &Output) -> Result<()> {
     Ok(())
 }
 
-/// Builds, checks and writes all three archives.
+/// Builds, checks and writes all three archives for this machine.
 pub fn pack(output: &Output) -> Result<Packed> {
-    let progress = output.progress("building the two libraries (a minute or two the first time)");
-    let libraries = library::build(&[CONTROLLER, PLANT])?;
-    progress.set_message("packing");
+    pack_for(&[Platform::Host], output)
+}
+
+/// Builds, checks and writes all three archives for some platforms.
+pub fn pack_for(platforms: &[Platform], output: &Output) -> Result<Packed> {
+    let (mut controllers, mut plants) = (Vec::new(), Vec::new());
+    for platform in platforms {
+        let folder = platform.folder();
+        let progress = output.progress(&format!("building for {folder} (a minute or two the first time)"));
+        let libraries = library::build(&[CONTROLLER, PLANT], *platform)?;
+        if *platform == Platform::PortableLinux {
+            libraries.iter().try_for_each(|library| library::ensure_portable(library))?;
+        }
+        controllers.push((*platform, libraries[0].clone()));
+        plants.push((*platform, libraries[1].clone()));
+        progress.finish_and_clear();
+    }
     let packages = licenses::metadata()?;
-    let interfaces = [interface_of(CONTROLLER)?, interface_of(PLANT)?];
-    let [controller, plant] = &interfaces;
-    let mut controller_files = contents::of(CONTROLLER, controller, &[(platform(), libraries[0].clone())], &packages)?;
-    let mut plant_files = contents::of(PLANT, plant, &[(platform(), libraries[1].clone())], &packages)?;
+    let [controller, plant] = &[interface_of(CONTROLLER)?, interface_of(PLANT)?];
+    let mut controller_files = contents::of(CONTROLLER, controller, &controllers, &packages)?;
+    let mut plant_files = contents::of(PLANT, plant, &plants, &packages)?;
     reference::add(
-        &library::verified(PLANT, &libraries[1], plant.clone())?,
-        &library::verified(CONTROLLER, &libraries[0], controller.clone())?,
+        &library::verified(PLANT, loadable(&plants)?, plant.clone())?,
+        &library::verified(CONTROLLER, loadable(&controllers)?, controller.clone())?,
         &mut plant_files,
         &mut controller_files,
     )?;
@@ -71,8 +106,13 @@ pub fn pack(output: &Output) -> Result<Packed> {
         plant: plant_files.save(&PLANT.archive())?,
         system: system.save(&workspace::system_archive())?,
     };
-    progress.finish_and_clear();
     Ok(packed)
+}
+
+/// The library that can be tried out here.
+fn loadable(libraries: &[(Platform, PathBuf)]) -> Result<&Path> {
+    let here = libraries.iter().find(|(platform, _)| platform.runs_here());
+    here.map(|(_, path)| path.as_path()).context("no library among those built runs on this machine")
 }
 
 /// The committed interface of a model.
