@@ -191,18 +191,29 @@ fn follow(actuator: &Actuator, position: f64, command: Ramp) -> (Piece, f64) {
         let rate = rate_max.copysign(if error.abs() > SAME_TIME * rate_max { error } else { command.slope });
         return (straight(position, rate), meeting(error, rate, command.slope));
     }
-    // The lag wants the rate (u - p) / tau; a rate limit holds it until the wish is back inside.
+    // The lag wants the rate w = (u - p) / tau, which approaches the command's slope: w = slope + (w_0 - slope)
+    // exp(-t / tau). A rate limit holds it at the limit until the wish is back inside, which never happens while the
+    // command runs away faster than the limit.
+    let Ramp { value, slope } = command;
     let wish = error / tau;
-    if rate_max > 0.0 && wish.abs() > rate_max * (1.0 + 1e-12) {
-        let rate = rate_max.copysign(error);
-        return (straight(position, rate), meeting(error - rate * tau, rate, command.slope));
+    let limit = if rate_max > 0.0 { rate_max } else { f64::INFINITY };
+    let escapes = slope.abs() > limit;
+    let at_limit = wish.abs() >= limit * (1.0 - 1e-9) && escapes && wish * slope > 0.0;
+    if at_limit || wish.abs() > limit * (1.0 + 1e-12) {
+        let rate = limit.copysign(wish);
+        return (
+            straight(position, rate),
+            if at_limit { f64::INFINITY } else { meeting(error - rate * tau, rate, slope) },
+        );
     }
-    let slope = if rate_max > 0.0 { command.slope.clamp(-rate_max, rate_max) } else { command.slope };
-    // p = u - slope tau + (p_0 - u_0 + slope tau) exp(-t / tau). A command steeper than the rate limit makes the wish
-    // reach the limit; from inside, following at the limit's slope never does, and the difference is never reached by
-    // commands that respect the limit themselves.
-    let ramp = Ramp { value: command.value - slope * tau, slope };
-    (Piece::Decay { ramp, amplitude: position - ramp.value, tau }, f64::INFINITY)
+    let ramp = Ramp { value: value - slope * tau, slope };
+    let length = if escapes {
+        let limit = limit.copysign(slope);
+        (tau * ((slope - wish) / (slope - limit)).ln()).max(SAME_TIME)
+    } else {
+        f64::INFINITY
+    };
+    (Piece::Decay { ramp, amplitude: position - ramp.value, tau }, length)
 }
 
 fn straight(value: f64, slope: f64) -> Piece {
@@ -214,3 +225,6 @@ fn meeting(gap: f64, rate: f64, slope: f64) -> f64 {
     let time = gap / (rate - slope);
     if time > 0.0 { time.max(SAME_TIME) } else { f64::INFINITY }
 }
+
+#[cfg(test)]
+mod tests;
