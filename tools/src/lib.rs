@@ -10,6 +10,7 @@ pub mod pack;
 pub mod plots;
 pub mod recording;
 pub mod simulate;
+pub mod train;
 pub mod workspace;
 pub mod xml;
 
@@ -41,6 +42,7 @@ enum Command {
     Merge(pack::merge::Args),
     Pack(pack::Args),
     Simulate(simulate::Args),
+    Train(Box<train::Args>),
 }
 
 impl Cli {
@@ -52,6 +54,7 @@ impl Cli {
             Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
+            Command::Train(args) => train::run(args, &output),
         }
     }
 }

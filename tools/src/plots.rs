@@ -8,9 +8,9 @@ use crate::html::{document, escape, table};
 use crate::recording::{Recording, Tracking, tracking_rows};
 
 /// Colours that stand out on white and on black.
-const BLUE: &str = "#2f80d0";
-const ORANGE: &str = "#e0821e";
-const GREY: &str = "#8a97a3";
+pub(crate) const BLUE: &str = "#2f80d0";
+pub(crate) const ORANGE: &str = "#e0821e";
+pub(crate) const GREY: &str = "#8a97a3";
 
 /// Draws all plots again when the reader switches between light and dark.
 const SCRIPT: &str = "
@@ -31,7 +31,7 @@ draw();
 ";
 
 /// One curve.
-struct Curve {
+pub(crate) struct Curve {
     name: &'static str,
     x: Vec<f64>,
     y: Vec<f64>,
@@ -40,24 +40,24 @@ struct Curve {
 }
 
 impl Curve {
-    fn new(name: &'static str, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
+    pub(crate) fn new(name: &'static str, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
         Self { name, x: x.to_vec(), y, color, dashed: false }
     }
 
-    fn dashed(self) -> Self {
+    pub(crate) fn dashed(self) -> Self {
         Self { dashed: true, ..self }
     }
 }
 
 /// A plot with its place on the page.
-struct Chart {
+pub(crate) struct Chart {
     id: &'static str,
     title: &'static str,
     note: &'static str,
     plot: Plot,
 }
 
-fn chart([id, title, note]: [&'static str; 3], [x, y]: [&str; 2], curves: Vec<Curve>) -> Chart {
+pub(crate) fn chart([id, title, note]: [&'static str; 3], [x, y]: [&str; 2], curves: Vec<Curve>) -> Chart {
     let mut plot = Plot::new();
     for curve in curves {
         let dash = if curve.dashed { DashType::Dash } else { DashType::Solid };
@@ -150,10 +150,14 @@ pub fn page(title: &str, lead: &str, run: &Recording, runs: &[(&str, Tracking)])
     let columns: Vec<(&str, bool)> =
         head.iter().enumerate().map(|(column, name)| (name.as_str(), column > 1)).collect();
     let cells: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| escape(cell)).collect()).collect();
-    let mut body =
-        format!("<h1>{}</h1>\n<p class=\"lead\">{}</p>\n{}", escape(title), escape(lead), table(&columns, &cells));
+    assemble(title, lead, &table(&columns, &cells), &charts(run))
+}
+
+/// A page with some markup above its charts.
+pub(crate) fn assemble(title: &str, lead: &str, above: &str, charts: &[Chart]) -> String {
+    let mut body = format!("<h1>{}</h1>\n<p class=\"lead\">{}</p>\n{above}", escape(title), escape(lead));
     let mut plots = String::from("const plots = {\n");
-    for chart in charts(run) {
+    for chart in charts {
         body.push_str(&format!(
             "<h2>{}</h2>\n<p class=\"note\">{}</p>\n<div class=\"plot\" id=\"{}\"></div>\n",
             escape(chart.title),
