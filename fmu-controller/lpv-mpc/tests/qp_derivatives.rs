@@ -23,7 +23,7 @@ fn solve<const NX: usize>(problem: &Problem<NX, 2>) -> (Structured<NX, 2>, Solut
 fn problem<const NX: usize>(seed: u64) -> Problem<NX, 2> {
     random_problem(&Stress {
         seed,
-        horizon: 3 + usize::try_from(seed % 20).unwrap(),
+        horizon: 3 + usize::try_from(seed % 20).expect("a number below twenty fits"),
         growth: 0.3,
         decades: 1.5,
         demand: 2.0,

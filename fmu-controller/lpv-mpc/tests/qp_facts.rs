@@ -182,7 +182,8 @@ fn inputs_without_room_stay_where_they_are() {
 
 #[test]
 fn data_without_sense_is_refused_by_both_solvers() {
-    let refused: [(&str, fn(&mut Problem<2, 1>)); 10] = [
+    type Spoil = fn(&mut Problem<2, 1>);
+    let refused: [(&str, Spoil); 10] = [
         ("no number in A", |p| p.stages[3].A[(0, 1)] = f64::NAN),
         ("infinite d", |p| p.stages[9].d[0] = f64::INFINITY),
         ("no number in the state", |p| p.x_0[1] = f64::NAN),

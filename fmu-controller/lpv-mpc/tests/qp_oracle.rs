@@ -45,6 +45,7 @@ fn count(cell: &Cell<u32>) {
     cell.set(cell.get() + 1);
 }
 
+#[allow(clippy::print_stdout, reason = "the tally belongs to the report of a long run")]
 fn agrees_with_clarabel<const NX: usize, const NU: usize>() {
     let tally = Tally::default();
     let mut runner = TestRunner::new_with_rng(

@@ -22,6 +22,13 @@ impl<const NX: usize, const NU: usize> Default for Stage<NX, NU> {
     }
 }
 
+impl<const NX: usize, const NU: usize> Stage<NX, NU> {
+    fn is_finite(&self) -> bool {
+        let vectors = self.d.iter().chain(self.x_ref.iter());
+        self.A.iter().chain(self.B.iter()).chain(vectors).all(|value| value.is_finite())
+    }
+}
+
 /// Tracking problem over `N = stages.len()` samples, with `du_i = u_i - u_(i-1)` and `u_(-1) = u_prev`:
 ///
 /// ```text
@@ -92,12 +99,11 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
     /// `q_terminal` is checked on its diagonal alone; a wrong one elsewhere shows in the outcome of the solve.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        // One sum per stage instead of one branch per number: a NaN or an infinity survives every addition, and finite data
-        // large enough to overflow a sum is no data to solve with either.
-        let stages = self
-            .stages
-            .iter()
-            .all(|stage| (stage.A.sum() + stage.B.sum() + stage.d.sum() + stage.x_ref.sum()).is_finite());
+        self.is_sensible() && self.stages.iter().all(Stage::is_finite)
+    }
+
+    /// [`Self::is_valid`] but for the stages, whose reading takes a noticeable part of a solve.
+    pub(super) fn is_sensible(&self) -> bool {
         let not_negative = |weight: &f64| *weight >= 0.0 && weight.is_finite();
         let bounds = (0..NU).all(|j| {
             self.u_min[j] <= self.u_max[j]
@@ -107,8 +113,7 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
                 && self.r[j] > 0.0
                 && self.r[j].is_finite()
         });
-        stages
-            && bounds
+        bounds
             && !self.stages.is_empty()
             && (self.x_0.sum() + self.u_prev.sum() + self.q_terminal.sum()).is_finite()
             && self.q.iter().all(not_negative)

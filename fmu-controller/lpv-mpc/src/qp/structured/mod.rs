@@ -104,14 +104,20 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         solution.iterations = 0;
         solution.residual = f64::INFINITY;
         solution.outcome = Outcome::Invalid;
-        if problem.stages.len() != self.horizon || !problem.is_valid() {
+        if problem.stages.len() != self.horizon || !problem.is_sensible() {
             return;
         }
         solution.x[0] = problem.x_0;
         for j in 0..NU {
             self.frozen[j] = problem.is_frozen(j);
         }
+        // Numbers that are not finite always reach the residual, so only a solve that fails has to look for them.
         if !self.descend(problem, solution, SWEEPS_MAX) {
+            if !problem.is_valid() {
+                solution.outcome = Outcome::Invalid;
+                self.reset();
+                return;
+            }
             self.solve_interior(problem, solution);
         }
         if !solution.outcome.has_plan() {

@@ -152,7 +152,10 @@ pub(super) fn step<const NX: usize, const NU: usize>(
     for c in 0..NX {
         let mut SA = [0.0; NX];
         for k in 0..NX {
-            axpy(A[c][k], &after.S[k], &mut SA);
+            // Prediction matrices of vehicles are half zeros, the same ones in every stage: the branch is free.
+            if A[c][k] != 0.0 {
+                axpy(A[c][k], &after.S[k], &mut SA);
+            }
         }
         let mut column = [0.0; NX];
         for k in 0..NX {

@@ -4,6 +4,7 @@ use super::super::optimality;
 use super::active::{self, Active};
 use super::riccati::{self, Value};
 use super::{Hold, Problem, Solution, Structured, WRONG_SIGN};
+use std::mem;
 
 /// Bounds that were left for the wrong sign of their multiplier.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,7 +21,8 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     pub(super) fn backward(&mut self, problem: &Problem<NX, NU>) -> bool {
         let N = self.horizon;
         let r = &problem.r.data.0[0];
-        let mut value = terminal(problem);
+        let (mut value, mut before) = (terminal(problem), Value::ZERO);
+        let (mut value, mut before) = (&mut value, &mut before);
         let mut demand = [None; NU];
         for i in (0..N).rev() {
             if i + 1 < N {
@@ -35,13 +37,11 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             for j in 0..NU {
                 (hold[j], demand[j]) = active::hold(problem, j, self.active[i][j], demand[j]);
             }
-            let mut before = Value::ZERO;
             let stage = &problem.stages[i];
-            if riccati::step(stage, &stage.d.data.0[0], &value, r, &hold, &mut self.policies[i], &mut before).is_none()
-            {
+            if riccati::step(stage, &stage.d.data.0[0], value, r, &hold, &mut self.policies[i], before).is_none() {
                 return false;
             }
-            value = before;
+            mem::swap(&mut value, &mut before);
         }
         true
     }
