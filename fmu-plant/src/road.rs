@@ -43,4 +43,16 @@ mod tests {
         let message = load("nowhere", &parameters, None).unwrap_err().to_string();
         assert!(message.starts_with("unknown road \"nowhere\": known are double_lane_change"), "{message}");
     }
+
+    #[test]
+    fn example_of_the_resources_is_a_closed_track() {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/resources"));
+        let road = load("example_track.csv", &Parameters::default(), Some(folder)).unwrap();
+        assert!(road.is_closed() && (500.0..600.0).contains(&road.length()), "{} m", road.length());
+        for i in 0..550 {
+            // 12 m/s stay below half of the grip.
+            let lateral = 144.0 * road.curvature(f64::from(i));
+            assert!(lateral.abs() < 4.02, "{lateral} m/s2 at {i} m");
+        }
+    }
 }
