@@ -20,6 +20,7 @@ th { color: var(--soft); font-weight: 600; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 code { font: .92em ui-monospace, monospace; }
 pre { background: var(--panel); border-radius: 6px; padding: .8rem 1rem; overflow-x: auto; }
+.what { min-width: 15rem; }
 .plot { width: 100%; height: 22rem; margin: .5rem 0 1rem; }
 @media (max-width: 40rem) { body { padding: 1rem .7rem 3rem; } .plot { height: 17rem; } td, th { padding-right: .5rem; } }
 ";

@@ -88,7 +88,7 @@ fn section(interface: &Interface, causality: &str, title: &str) -> String {
             };
             vec![
                 format!("<code>{}</code>", escape(&name)),
-                escape(&variable.description),
+                format!("<div class=\"what\">{}</div>", escape(&variable.description)),
                 text(&variable.unit),
                 text(&variable.start),
                 range,
@@ -107,6 +107,11 @@ fn section(interface: &Interface, causality: &str, title: &str) -> String {
         ("range", false),
         ("may change", false),
     ];
+    // An output has no start value: a column that nobody fills only takes the room of the others.
+    let used: Vec<usize> = (0..head.len()).filter(|&column| rows.iter().any(|row| !row[column].is_empty())).collect();
+    let head: Vec<(&str, bool)> = used.iter().map(|&column| head[column]).collect();
+    let rows: Vec<Vec<String>> =
+        rows.iter().map(|row| used.iter().map(|&column| row[column].clone()).collect()).collect();
     format!("<h3>{title}</h3>\n{}", table(&head, &rows))
 }
 
@@ -150,5 +155,7 @@ mod tests {
             assert!(page.contains(part), "{part} is missing in\n{page}");
         }
         assert!(!page.contains("<h3>Outputs</h3>"));
+        // Only the second table has start values.
+        assert_eq!(page.matches(">start</th>").count(), 1);
     }
 }
