@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::clock::Clock;
 use crate::error::Error;
 use crate::lifecycle::Phase;
-use crate::model::{Category, Experiment, InputDerivative, Log, Model, Outcome, Step};
+use crate::model::{Category, Experiment, Log, Model, Outcome, Step};
 use crate::state::State;
 use crate::table::{Role, Row};
 use crate::value::{Kind, Scalar};
@@ -17,7 +17,7 @@ pub(crate) struct Instance<M: Model, L: Log> {
     pub log: L,
     resources: Option<PathBuf>,
     /// The model as initialisation would leave it, when an output was read in initialisation mode.
-    ahead: Option<Box<M>>,
+    pub ahead: Option<Box<M>>,
     /// Strings that the importer may read until its next call.
     strings: Vec<CString>,
 }
@@ -43,6 +43,7 @@ impl<M: Model, L: Log> Instance<M, L> {
             None => initialize(&mut self.state.model, self.state.clock, self.resources.as_deref(), &mut self.log)?,
         }
         self.state.phase = Phase::StepComplete;
+        self.state.initialised = true;
         self.state.retune = false;
         self.state.stale = true;
         if self.log.enabled(Category::Event) {
@@ -145,79 +146,9 @@ impl<M: Model, L: Log> Instance<M, L> {
         Ok(&self.strings)
     }
 
-    pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<(), Error> {
-        let (row, element) = variable::<M>(reference, Kind::Real)?;
-        let unavailable = || Error::Derivative { name: row.element_name(element), order };
-        if row.role != Role::Input {
-            return Err(Error::Frozen {
-                name: row.element_name(element),
-                reason: "only inputs have input derivatives",
-            });
-        }
-        let order = u32::try_from(order).map_err(|_| unavailable())?;
-        if !(1..=M::INFO.max_input_derivative_order).contains(&order) {
-            return Err(unavailable());
-        }
-        if !value.is_finite() {
-            return Err(range_error(row, element, Scalar::Real(value)));
-        }
-        let derivatives = &mut self.state.input_derivatives;
-        match derivatives.iter_mut().find(|known| known.reference == reference && known.order == order) {
-            Some(known) => known.value = value,
-            None => derivatives.push(InputDerivative { reference, order, value }),
-        }
-        Ok(())
-    }
-
-    pub fn output_derivative(&mut self, reference: u32, order: i32) -> Result<f64, Error> {
-        let (row, element) = variable::<M>(reference, Kind::Real)?;
-        let unavailable = || Error::Derivative { name: row.element_name(element), order };
-        let positive = u32::try_from(order).map_err(|_| unavailable())?;
-        if row.role != Role::Output || !(1..=M::INFO.max_output_derivative_order).contains(&positive) {
-            return Err(unavailable());
-        }
-        self.update(row, element)?;
-        self.state.model.output_derivative(reference, positive).ok_or_else(unavailable)
-    }
-
-    pub fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        sensitivity: &mut [f64],
-    ) -> Result<(), Error> {
-        if !M::INFO.directional_derivative {
-            return Err(Error::Directional("this model provides none".to_owned()));
-        }
-        for &unknown in unknowns {
-            let (row, element) = variable::<M>(unknown, Kind::Real)?;
-            if !row.role.is_calculated() {
-                return Err(Error::Directional(format!("variable {} is not calculated", row.element_name(element))));
-            }
-            self.update(row, element)?;
-        }
-        for &known in knowns {
-            let (row, element) = variable::<M>(known, Kind::Real)?;
-            if row.role.is_calculated() {
-                return Err(Error::Directional(format!(
-                    "variable {} is not an independent one",
-                    row.element_name(element)
-                )));
-            }
-        }
-        if let Some(value) = seed.iter().find(|value| !value.is_finite()) {
-            return Err(Error::Directional(format!("seed {value} is not finite")));
-        }
-        let model = self.ahead.as_deref().unwrap_or(&self.state.model);
-        model
-            .directional_derivative(unknowns, knowns, seed, sensitivity)
-            .map_err(|error| Error::Directional(error.to_string()))
-    }
-
     /// Makes a calculated variable readable.
     #[inline]
-    fn update(&mut self, row: &Row<M>, element: usize) -> Result<(), Error> {
+    pub fn update(&mut self, row: &Row<M>, element: usize) -> Result<(), Error> {
         match self.state.phase {
             Phase::StepComplete if row.lazy && self.state.stale => self.refresh(),
             Phase::InitializationMode if self.ahead.is_none() => {
@@ -270,7 +201,7 @@ fn initialize<M: Model>(
 }
 
 #[inline]
-fn variable<M: Model>(reference: u32, kind: Kind) -> Result<(&'static Row<M>, usize), Error> {
+pub(crate) fn variable<M: Model>(reference: u32, kind: Kind) -> Result<(&'static Row<M>, usize), Error> {
     match M::table().lookup(reference) {
         Some((row, element)) if row.kind == kind => Ok((row, element)),
         wrong => Err(reference_error(wrong, reference, kind)),
@@ -288,7 +219,7 @@ fn reference_error<M>(found: Option<(&'static Row<M>, usize)>, reference: u32, w
 }
 
 #[cold]
-fn range_error<M>(row: &Row<M>, element: usize, value: Scalar<'_>) -> Error {
+pub(crate) fn range_error<M>(row: &Row<M>, element: usize, value: Scalar<'_>) -> Error {
     let value = match value {
         Scalar::Real(value) => format!("{value:?}"),
         Scalar::Integer(value) => value.to_string(),

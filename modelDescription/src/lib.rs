@@ -81,6 +81,7 @@ pub mod abi;
 mod clock;
 mod consistency;
 mod current;
+mod derivatives;
 mod error;
 mod guid;
 mod instance;

@@ -17,6 +17,8 @@ pub(crate) struct State<M: Model> {
     pub phase: Phase,
     pub clock: Clock,
     pub input_derivatives: Vec<InputDerivative>,
+    /// `Model::initialize` succeeded.
+    pub initialised: bool,
     /// Tunable parameters were set since the last step.
     pub retune: bool,
     /// Something changed since `Model::refresh`.
@@ -30,6 +32,7 @@ impl<M: Model> Default for State<M> {
             phase: Phase::Instantiated,
             clock: Clock::default(),
             input_derivatives: Vec::new(),
+            initialised: false,
             retune: false,
             stale: true,
         }
@@ -89,4 +92,80 @@ fn header<M: Model>() -> [u8; LENGTH_AT] {
 
 fn digest(header: &[u8], payload: &[u8]) -> [u8; 32] {
     Sha256::new().chain_update(header).chain_update(payload).finalize().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::model::{Experiment, Info, Log, Outcome, Step};
+    use crate::table::Table;
+
+    /// Lengths, options and text in one model: what a decoder can trip over.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    struct Awkward {
+        list: Vec<f64>,
+        text: String,
+        choice: Option<Box<Awkward>>,
+    }
+
+    impl Model for Awkward {
+        const INFO: Info = Info {
+            name: "Awkward",
+            identifier: "awkward",
+            description: "Hard to decode",
+            version: "0",
+            step_size: 1.0,
+            stop_time: 1.0,
+            max_step: 1.0,
+            max_input_derivative_order: 0,
+            max_output_derivative_order: 0,
+            directional_derivative: false,
+        };
+        type Error = String;
+
+        fn table() -> &'static Table<Self> {
+            crate::variables! { Awkward; Parameter text "Any text" => text; }
+        }
+
+        fn initialize(&mut self, _: &Experiment<'_>, _: &mut dyn Log) -> Result<(), String> {
+            Ok(())
+        }
+
+        fn step(&mut self, _: &Step<'_>, _: &mut dyn Log) -> Result<Outcome, String> {
+            Ok(Outcome::Ok)
+        }
+    }
+
+    /// Header and checksum as they should be, around any payload.
+    fn sealed(payload: &[u8]) -> Vec<u8> {
+        let mut bytes = header::<Awkward>().to_vec();
+        bytes.extend_from_slice(&(payload.len() as u64).to_le_bytes());
+        let digest = digest(&bytes, payload);
+        bytes.extend_from_slice(&digest);
+        bytes.extend_from_slice(payload);
+        bytes
+    }
+
+    #[test]
+    fn a_state_comes_back_from_its_bytes() {
+        let inner = Awkward { list: vec![-0.0, f64::MIN_POSITIVE], ..Awkward::default() };
+        let model = Awkward { text: "ü".to_owned(), choice: Some(Box::new(inner)), ..Awkward::default() };
+        let state = State { model: model.clone(), ..State::default() };
+        let bytes = state.to_bytes().unwrap();
+        let back = State::<Awkward>::from_bytes(&bytes).unwrap();
+        assert_eq!(back.model, model);
+        assert_eq!(back.to_bytes().unwrap(), bytes);
+    }
+
+    proptest! {
+        /// A checksum protects from accidents, not from a sender who computes it: the decoder must hold by itself.
+        #[test]
+        fn any_sealed_payload_is_decoded_or_refused(payload in prop::collection::vec(any::<u8>(), 0..200)) {
+            if let Ok(state) = State::<Awkward>::from_bytes(&sealed(&payload)) {
+                prop_assert!(state.to_bytes().is_ok());
+            }
+        }
+    }
 }

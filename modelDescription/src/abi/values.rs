@@ -115,9 +115,7 @@ pub unsafe fn set_real_input_derivatives<M: Model>(
     unsafe {
         call::<M>(component, &of::SET_REAL_INPUT_DERIVATIVES, |slave| {
             let (orders, values) = (input("order", order, n)?, input("value", value, n)?);
-            for ((&reference, &order), &value) in input("vr", vr, n)?.iter().zip(orders).zip(values) {
-                slave.set_input_derivative(reference, order, value)?;
-            }
+            slave.set_input_derivatives(input("vr", vr, n)?, orders, values)?;
             Ok(Status::Ok)
         })
     }

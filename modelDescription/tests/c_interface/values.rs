@@ -209,3 +209,34 @@ fn output_and_directional_derivatives_reach_the_importer() {
     assert_eq!(directional(unknown, unknown, &mut sensitivity), ERROR, "an output is no known");
     assert_eq!(directional(unknown, vr("limit"), &mut sensitivity), ERROR, "an integer has no derivative");
 }
+
+#[test]
+fn derivatives_of_an_instance_that_was_never_initialised_are_refused_without_harm() {
+    let slave = Slave::new(&guid());
+    slave.set_string(vr("label"), c"bad");
+    assert_eq!(slave.initialize(), ERROR);
+    let (unknown, known, seed, order, mut value) = (vr("double_u"), vr("u"), 1.0, 1, 0.0);
+    unsafe {
+        let c = slave.component;
+        let (u, k) = (&raw const unknown, &raw const known);
+        assert_eq!(fmi2GetDirectionalDerivative(c, u, 1, k, 1, &raw const seed, &raw mut value), ERROR);
+        assert_eq!(
+            fmi2GetDirectionalDerivative(c, u, 0, k, 1, &raw const seed, &raw mut value),
+            OK,
+            "nothing is asked for"
+        );
+        assert_eq!(fmi2GetRealOutputDerivatives(c, u, 1, &raw const order, &raw mut value), ERROR);
+    }
+}
+
+#[test]
+fn input_derivatives_are_set_all_or_none() {
+    let slave = Slave::started(&guid(), 0.0);
+    let (references, orders, values) = ([vr("u"), vr("y")], [1, 1], [5.0, 5.0]);
+    let status = unsafe {
+        fmi2SetRealInputDerivatives(slave.component, references.as_ptr(), 2, orders.as_ptr(), values.as_ptr())
+    };
+    assert_eq!(status, ERROR, "y is no input");
+    slave.step(0.0, 1.0);
+    assert_eq!(slave.get(vr("y")), Ok(0.0), "the derivative of u was not taken over");
+}
