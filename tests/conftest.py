@@ -2,12 +2,13 @@
 
 import ctypes
 import importlib.metadata
+import os
 import pathlib
 
 import pytest
 
 ROOT = pathlib.Path(__file__).parent.parent
-ARCHIVES = ROOT / "target" / "fmu"
+ARCHIVES = ROOT / os.environ.get("FMU_ARCHIVES", "target/fmu")
 
 
 def _archive(name):

@@ -64,18 +64,13 @@ pub const PLANT: Model = Model {
 pub const SYSTEM: &str = "ClosedLoop";
 
 impl Model {
-    /// Path of the finished archive.
-    pub fn archive(&self) -> PathBuf {
-        archive_folder().join(format!("{}.fmu", self.name))
+    /// File name of the finished archive.
+    pub fn archive(&self) -> String {
+        format!("{}.fmu", self.name)
     }
 
     /// Path of the committed model description.
     pub fn description_file(&self) -> PathBuf {
         root().join("modelDescription").join(self.description)
     }
-}
-
-/// Path of the finished system.
-pub fn system_archive() -> PathBuf {
-    archive_folder().join(format!("{SYSTEM}.ssp"))
 }

@@ -36,6 +36,9 @@ pub struct Args {
     /// Build for linux64 with glibc 2.17 or newer and for win64, into the same archives
     #[arg(long)]
     pub portable: bool,
+    /// Folder of the finished archives; target/fmu unless given
+    #[arg(long, value_name = "FOLDER")]
+    pub into: Option<PathBuf>,
 }
 
 /// The finished archives.
@@ -59,7 +62,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             platforms.pop();
         }
     }
-    let packed = pack_for(&platforms, output)?;
+    let folder = args.into.clone().unwrap_or_else(workspace::archive_folder);
+    let packed = pack_for(&platforms, &folder, output)?;
     for path in [&packed.controller, &packed.plant, &packed.system] {
         let size = path.metadata()?.len();
         output.line(&format!("{:<34} {:>7.1} kB", workspace::shown(path), size as f64 / 1e3));
@@ -69,15 +73,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 
 /// Builds, checks and writes all three archives for this machine.
 pub fn pack(output: &Output) -> Result<Packed> {
-    pack_for(&[Platform::Host], output)
+    pack_for(&[Platform::Host], &workspace::archive_folder(), output)
 }
 
-/// Builds, checks and writes all three archives for some platforms.
-pub fn pack_for(platforms: &[Platform], output: &Output) -> Result<Packed> {
+/// Builds and checks all three archives for some platforms and writes them to a folder.
+pub fn pack_for(platforms: &[Platform], folder: &Path, output: &Output) -> Result<Packed> {
     let (mut controllers, mut plants) = (Vec::new(), Vec::new());
     for platform in platforms {
-        let folder = platform.folder();
-        let progress = output.progress(&format!("building for {folder} (a minute or two the first time)"));
+        let progress = output.progress(&format!("building for {} (a minute or two the first time)", platform.folder()));
         let libraries = library::build(&[CONTROLLER, PLANT], *platform)?;
         if *platform == Platform::PortableLinux {
             libraries.iter().try_for_each(|library| library::ensure_portable(library))?;
@@ -102,9 +105,9 @@ pub fn pack_for(platforms: &[Platform], output: &Output) -> Result<Packed> {
     }
     let system = system::of(controller, plant, resources)?;
     let packed = Packed {
-        controller: controller_files.save(&CONTROLLER.archive())?,
-        plant: plant_files.save(&PLANT.archive())?,
-        system: system.save(&workspace::system_archive())?,
+        controller: controller_files.save(&folder.join(CONTROLLER.archive()))?,
+        plant: plant_files.save(&folder.join(PLANT.archive()))?,
+        system: system.save(&folder.join(workspace::SYSTEM).with_extension("ssp"))?,
     };
     Ok(packed)
 }
