@@ -55,7 +55,10 @@ def sweep(archive, speed=20.0, rate=0.003, stop=0.1, **parameters):
     finally:
         plant.freeInstance()
         shutil.rmtree(folder, ignore_errors=True)
-    return np.array(rows).T
+    a_lat, beyond = np.array(rows).T
+    # Beyond the peak the car spins or slides: no steady state any more.
+    end = a_lat.argmax() + 1
+    return a_lat[:end], beyond[:end]
 
 
 def main():

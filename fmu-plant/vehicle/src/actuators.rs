@@ -92,7 +92,7 @@ impl Piece {
 }
 
 /// Position and memory of one actuator.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position reached [unit].
     pub position: f64,
@@ -100,12 +100,29 @@ pub struct State {
     history: VecDeque<(f64, Ramp)>,
 }
 
+impl Clone for State {
+    /// Keeps the room for commands to come, so that no later step allocates.
+    fn clone(&self) -> Self {
+        let mut history = VecDeque::with_capacity(self.history.capacity());
+        history.extend(&self.history);
+        Self { position: self.position, history }
+    }
+}
+
 impl State {
     /// At rest in position 0.
     #[must_use]
     pub fn new(actuator: &Actuator) -> Self {
-        let capacity = if actuator.delay > 0.0 { CAPACITY } else { 0 };
-        Self { position: 0.0, history: VecDeque::with_capacity(capacity) }
+        let mut state = Self { position: 0.0, history: VecDeque::new() };
+        state.make_room(actuator);
+        state
+    }
+
+    /// Makes room for all commands to come, so that no step allocates.
+    pub(crate) fn make_room(&mut self, actuator: &Actuator) {
+        if actuator.delay > 0.0 {
+            self.history.reserve(CAPACITY.saturating_sub(self.history.len()));
+        }
     }
 
     /// Takes the command that holds from `time` on.
@@ -123,7 +140,7 @@ impl State {
         {
             return;
         }
-        if self.history.len() == CAPACITY {
+        if self.history.len() >= CAPACITY {
             self.history.remove(1);
         }
         self.history.push_back((time, command));

@@ -98,9 +98,11 @@ struct Saved {
 impl TryFrom<Saved> for Vehicle {
     type Error = Error;
 
-    fn try_from(Saved { parameters, road, state }: Saved) -> Result<Self, Error> {
+    fn try_from(Saved { parameters, road, mut state }: Saved) -> Result<Self, Error> {
         parameters.validate()?;
         let derived = Derived::new(&parameters, &road);
+        state.steering.make_room(&derived.steering);
+        state.drive.make_room(&derived.drive);
         Ok(Self { parameters, road, state, derived })
     }
 }

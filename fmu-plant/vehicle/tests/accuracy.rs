@@ -3,7 +3,7 @@
 mod driver;
 
 use driver::{T_S, drive, vehicle};
-use vehicle::{Inputs, Parameters, Vehicle, dynamics};
+use vehicle::{Inputs, Parameters, Road, Vehicle, dynamics};
 
 /// Largest difference between two vehicles' states.
 fn distance(a: &Vehicle, b: &Vehicle) -> f64 {
@@ -72,13 +72,19 @@ fn communication_steps_that_divide_the_sample_time_agree() {
 
 #[test]
 fn saved_vehicle_continues_with_the_same_bits() {
-    let mut one = vehicle("general", with_actuators());
-    drive(&mut one, 100, 4, |_| ()).unwrap();
-    let mut other = one.clone();
-    drive(&mut one, 100, 4, |_| ()).unwrap();
-    drive(&mut other, 100, 4, |_| ()).unwrap();
-    assert_eq!(one.truth(), other.truth());
-    assert_eq!(one.measurement(), other.measurement());
+    let table = "x,y,v_x\n0,0,9\n10,0,9\n20,1,9\n30,3,9\n45,8,9\n60,16,9\n80,30,9\n";
+    let csv = Vehicle::new(with_actuators(), Road::from_csv(table).unwrap()).unwrap();
+    for mut one in [vehicle("general", with_actuators()), vehicle("iso_3888_2", with_actuators()), csv] {
+        drive(&mut one, 100, 4, |_| ()).unwrap();
+        let mut cloned = one.clone();
+        let mut read: Vehicle = postcard::from_bytes(&postcard::to_stdvec(&one).unwrap()).unwrap();
+        drive(&mut one, 100, 4, |_| ()).unwrap();
+        for other in [&mut cloned, &mut read] {
+            drive(other, 100, 4, |_| ()).unwrap();
+            assert_eq!(one.truth(), other.truth());
+            assert_eq!((one.measurement(), one.preview()), (other.measurement(), other.preview()));
+        }
+    }
 }
 
 #[test]
