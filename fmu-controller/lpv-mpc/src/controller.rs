@@ -9,9 +9,10 @@ use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
 use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::{Adaptation, Estimation, HORIZON_MAX};
+use crate::qp::Problem;
 use crate::sensitivity::{self, Snapshot};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
@@ -126,6 +127,14 @@ impl Controller {
         self.beliefs.tyres.tune(parameters.nominal_tyres());
         with_mpc!(&mut self.core, mpc => mpc.tune(parameters));
         Ok(())
+    }
+
+    /// The quadratic programme of the last sample, when the actuators are ideal.
+    pub fn problem(&self) -> Option<&Problem<NX, NU>> {
+        match &self.core {
+            Core::Ideal(mpc) => Some(&mpc.problem),
+            Core::Lags(_) => None,
+        }
     }
 
     /// Samples taken so far.
