@@ -27,18 +27,7 @@ impl Default for Adder {
 }
 
 impl Model for Adder {
-    const INFO: Info = Info {
-        name: "Adder",
-        identifier: "adder",
-        description: "Adds its input",
-        version: "0",
-        step_size: 0.001,
-        stop_time: 1.0,
-        max_step: 1.0,
-        max_input_derivative_order: 0,
-        max_output_derivative_order: 0,
-        directional_derivative: false,
-    };
+    const INFO: Info = Info { name: "Adder", identifier: "adder", description: "Adds its input", ..Info::PLAIN };
     type Error = String;
 
     fn table() -> &'static Table<Self> {

@@ -28,10 +28,7 @@
 //!         version: env!("CARGO_PKG_VERSION"),
 //!         step_size: 0.01,
 //!         stop_time: 5.0,
-//!         max_step: 10.0,
-//!         max_input_derivative_order: 0,
-//!         max_output_derivative_order: 0,
-//!         directional_derivative: false,
+//!         ..Info::PLAIN
 //!     };
 //!     type Error = String;
 //!

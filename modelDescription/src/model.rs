@@ -96,6 +96,22 @@ pub struct Info {
     pub directional_derivative: bool,
 }
 
+impl Info {
+    /// A model without capabilities beyond the mandatory ones, for struct update: `Info { name: "Lag", ..Info::PLAIN }`.
+    pub const PLAIN: Self = Self {
+        name: "",
+        identifier: "",
+        description: "",
+        version: "",
+        step_size: 0.01,
+        stop_time: 1.0,
+        max_step: 10.0,
+        max_input_derivative_order: 0,
+        max_output_derivative_order: 0,
+        directional_derivative: false,
+    };
+}
+
 /// What is known when initialisation mode ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment<'a> {

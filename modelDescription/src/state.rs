@@ -111,18 +111,8 @@ mod tests {
     }
 
     impl Model for Awkward {
-        const INFO: Info = Info {
-            name: "Awkward",
-            identifier: "awkward",
-            description: "Hard to decode",
-            version: "0",
-            step_size: 1.0,
-            stop_time: 1.0,
-            max_step: 1.0,
-            max_input_derivative_order: 0,
-            max_output_derivative_order: 0,
-            directional_derivative: false,
-        };
+        const INFO: Info =
+            Info { name: "Awkward", identifier: "awkward", description: "Hard to decode", ..Info::PLAIN };
         type Error = String;
 
         fn table() -> &'static Table<Self> {

@@ -74,12 +74,11 @@ impl Model for Sample {
         identifier: "sample",
         description: "A variable of every kind",
         version: "1.0",
-        step_size: 0.01,
-        stop_time: 1.0,
         max_step: 100.0,
         max_input_derivative_order: 1,
         max_output_derivative_order: 1,
         directional_derivative: true,
+        ..Info::PLAIN
     };
     type Error = String;
 
