@@ -100,6 +100,13 @@ fn assert_finite(vehicle: &Vehicle, inputs: &Inputs, case: &str) {
     let more = [o.c_f_true, o.c_r_true, o.delta_actual, o.a_x_actual, o.grip_usage, o.wind_speed_actual, o.x, o.y];
     let finite = shown.iter().chain(&more).all(|value| value.is_finite());
     assert!(finite, "{case}: {o:?} {m:?}\n{:?}\n{inputs:?}", vehicle.parameters());
+    let seed = Inputs { delta: 1.0, a_x: 1.0, wind_speed: 1.0, wind_direction: 1.0, mu_scale: 1.0 };
+    for (name, d) in [("inputs", vehicle.outputs_along(inputs, &seed)), ("time", vehicle.outputs_rate(inputs))] {
+        let derivatives = [d.v_x_true, d.v_y_true, d.yaw_rate_true, d.s, d.a_lat, d.a_long, d.alpha_f, d.alpha_r];
+        let more = [d.f_yf, d.f_yr, d.c_f_true, d.c_r_true, d.grip_usage, d.wind_speed_actual, d.a_x_actual];
+        let finite = derivatives.iter().chain(&more).all(|value| value.is_finite());
+        assert!(finite, "{case}: derivative by {name} {d:?}\n{:?}\n{inputs:?}", vehicle.parameters());
+    }
     let preview = vehicle.preview();
     assert!(preview.kappa_ref.iter().chain(&preview.v_x_ref).all(|value| value.is_finite()), "{case}");
 }
