@@ -151,10 +151,15 @@ pub const HEAD: [&str; 11] = ["", "R2", "", "RMSE", "", "worst", "", "force", ""
 pub fn row(name: &str, score: &Score) -> Vec<String> {
     let Score { r_squared, rmse, worst, force, worst_force } = score;
     let mut cells = vec![name.to_owned()];
-    cells.extend(r_squared.iter().map(|value| format!("{value:.5}")));
+    cells.extend(r_squared.iter().map(|&value| known(value)));
     cells.extend(rmse.iter().chain(worst).map(|value| format!("{:.2}", value * 1e-3)));
     cells.extend(force.iter().chain(worst_force).map(|value| format!("{:.2}", value * 100.0)));
     cells
+}
+
+/// A coefficient of determination; a stiffness that never changes (`linear`) has none.
+fn known(value: f64) -> String {
+    if value.is_finite() { format!("{value:.5}") } else { "-".to_owned() }
 }
 
 /// All ways to answer: the network and what needs no network.

@@ -9,7 +9,7 @@ pub const DURATION: f64 = 5.0;
 pub const SPEED: (f64, f64) = (5.0, 25.0);
 /// Grip that the standard set reaches [1].
 pub const GRIP: (f64, f64) = (0.1, 0.9);
-/// Largest slip angles of the set beyond: from about 90 % of grip to three times the slip of `dry_asphalt`'s peak over two [rad].
+/// Largest slip angles of the set beyond [rad]: from 90 % of grip to half as much again as where `dry_asphalt` peaks.
 pub const SLIP: (f64, f64) = (0.1, 0.3);
 
 /// Kinds of excitation.

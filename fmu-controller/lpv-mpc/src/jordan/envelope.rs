@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// Belief fades over this share of a range's width, on each side of it [1].
 ///
-/// Measured on manoeuvres beyond the training slip (`cargo fmu train --evaluate` prints it): a tenth outside, the force is
-/// still within a few percent of the grip; farther out errors grow without a bound that anything promises.
+/// Our choice: a jump of the stiffness would shake the plan, so the fading needs room; the network's error grows quickly outside
+/// of what it saw, so the room is small.
 pub const MARGIN: f64 = 0.1;
 
 /// Smallest and largest value seen in training.
