@@ -18,6 +18,7 @@
 //! - [Hucho] W.-H. Hucho (editor), Aerodynamics of Road Vehicles, 4th edition, 1998.
 //! - [Hairer] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, 1993.
 #![forbid(unsafe_code)]
+#![allow(rustdoc::broken_intra_doc_links, reason = "citation keys stand in brackets, as the references list them")]
 
 pub mod actuators;
 pub mod aero;
