@@ -7,7 +7,7 @@ use std::ptr;
 use super::c::*;
 use super::logger::Logger;
 use super::pointers::{input, text};
-use super::{Slave, call, panics};
+use super::{Slave, call, float, panics};
 use crate::error::Error;
 use crate::guid;
 use crate::lifecycle as of;
@@ -24,6 +24,18 @@ pub unsafe fn instantiate<M: Model>(
     logging: Boolean,
 ) -> Component {
     panics::install_hook();
+    // SAFETY: the caller's promise.
+    float::in_standard_mode(|| unsafe { create::<M>(name, kind, guid, resources, callbacks, logging) })
+}
+
+unsafe fn create<M: Model>(
+    name: Text,
+    kind: Integer,
+    guid: Text,
+    resources: Text,
+    callbacks: *const Callbacks,
+    logging: Boolean,
+) -> Component {
     // SAFETY: FMI 2.0.4, section 2.1.5: callbacks points at the functions until this call returns; they are copied.
     let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return ptr::null_mut() };
     // SAFETY: FMI 2.0.4, section 2.1.2: fmi2String is a NUL-terminated string.

@@ -8,6 +8,7 @@
 
 mod c;
 mod export;
+mod float;
 mod instances;
 mod logger;
 mod panics;
@@ -43,15 +44,17 @@ unsafe fn call<M: Model>(
 ) -> Status {
     // SAFETY: FMI 2.0.4, section 2.1.5: the importer passes what fmi2Instantiate returned, and calls one instance at a time.
     let Some(slave) = (unsafe { component.cast::<Slave<M>>().as_mut() }) else { return Status::Error };
-    let result = if function.is_allowed_in(slave.state.phase) {
-        panics::catch(|| body(slave)).unwrap_or_else(|panic| Err(Error::Panic(panic)))
-    } else {
-        Err(Error::CallSequence(slave.state.phase))
-    };
-    match result {
-        Ok(status) => status,
-        Err(error) => refuse(slave, function, &error),
-    }
+    float::in_standard_mode(|| {
+        let result = if function.is_allowed_in(slave.state.phase) {
+            panics::catch(|| body(slave)).unwrap_or_else(|panic| Err(Error::Panic(panic)))
+        } else {
+            Err(Error::CallSequence(slave.state.phase))
+        };
+        match result {
+            Ok(status) => status,
+            Err(error) => refuse(slave, function, &error),
+        }
+    })
 }
 
 #[cold]
