@@ -1,6 +1,7 @@
 //! The tools around the two FMUs: pack them, drive them, show what they do. Run as `cargo fmu COMMAND`.
 
 pub mod archive;
+pub mod bench;
 pub mod demo;
 pub mod html;
 pub mod importer;
@@ -38,6 +39,7 @@ pub struct Cli {
 
 #[derive(Clone, Debug, Subcommand)]
 enum Command {
+    Bench(bench::Args),
     Demo(demo::Args),
     Merge(pack::merge::Args),
     Pack(pack::Args),
@@ -50,6 +52,7 @@ impl Cli {
     pub fn run(&self) -> Result<()> {
         let output = Output::default();
         match &self.command {
+            Command::Bench(args) => bench::run(args, &output),
             Command::Demo(args) => demo::run(args, &output),
             Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),

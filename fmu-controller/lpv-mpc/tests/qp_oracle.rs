@@ -85,10 +85,9 @@ fn agrees_with_clarabel<const NX: usize, const NU: usize>() {
         let scale = upper + problem.cost(&solution.x, &vec![problem.u_prev_clamped(); stress.horizon]);
         // Any plan within the bounds costs at least the optimum; 1e-9 covers the sums' rounding.
         prop_assert!(cost <= upper + 1e-9 * scale, "cost {cost:e}, Clarabel {upper:e}");
-        if reference.residual < 1e-6 {
-            // The cost is flat at the optimum: an error of the plan enters squared.
-            prop_assert!(upper <= cost + 1e-6 * scale, "cost {cost:e}, Clarabel {upper:e}");
-        } else {
+        // The other way round only Clarabel's accuracy is at stake: both plans are within the bounds, so the cheaper one is
+        // the better one. Where it is far off it is no reference.
+        if upper > cost + 1e-6 * scale {
             count(&tally.oracle_failed);
         }
         Ok(())
@@ -104,6 +103,7 @@ fn agrees_with_clarabel<const NX: usize, const NU: usize>() {
     if let Err(failure) = result {
         panic!("{failure}");
     }
+    assert!(oracle_failed.get() * 10 <= cases(), "Clarabel is no reference for {} of {}", oracle_failed.get(), cases());
     // Flagged is honest but must stay rare.
     assert!(flagged.get() * 1000 <= cases(), "{} of {} not converged", flagged.get(), cases());
 }
