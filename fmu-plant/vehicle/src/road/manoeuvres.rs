@@ -12,8 +12,8 @@ use crate::{
 const STRAIGHT: f64 = 2000.0;
 /// Straight and transition before a circle [m].
 const ENTRY: f64 = 50.0;
-/// Grid of the tables [m].
-const STEP: f64 = 0.05;
+/// Grid of the tables [m]; transitions are 40 m long and more.
+const STEP: f64 = 0.2;
 
 /// A straight road at a constant speed [m/s].
 pub(super) fn straight(speed: f64) -> Tables {

@@ -1,15 +1,17 @@
 //! A smooth function on a uniform grid: cubic Hermite pieces, looked up in constant time.
 
+use std::sync::Arc;
+
 use crate::Scalar;
 
-/// A function of one variable from 0 on; the end values are held outside.
+/// A function of one variable from 0 on; the end values are held outside. Copies share the table.
 #[derive(Debug, Clone)]
 pub struct Profile {
     per_step: f64,
     /// Number of cells, as a number to compare with.
     end: f64,
     /// Value, and slope times the grid step, at each knot.
-    knots: Vec<[f64; 2]>,
+    knots: Arc<[[f64; 2]]>,
 }
 
 impl Profile {

@@ -7,6 +7,8 @@ const V_MIN: f64 = 0.1;
 
 /// Grid of the place over time [s]; the reference's acceleration changes over seconds.
 const STEP: f64 = 0.01;
+/// Cells of that grid at most: on a road that takes more than five hours to drive they are longer.
+const CELLS_MAX: f64 = 2e6;
 
 /// Time over place and place over time of a reference that drives the road's speed.
 #[derive(Debug, Clone)]
@@ -40,7 +42,7 @@ impl Schedule {
         let duration = time.at(length);
         let mut t_done = 0.0;
         let mut s = 0.0;
-        let place = Profile::new(duration, STEP, |t| {
+        let place = Profile::new(duration, STEP.max(duration / CELLS_MAX), |t| {
             let h = t - t_done;
             // s' depends on s alone; a few Newton steps on the tabulated time keep both tables each other's inverse.
             s += h * speed(s);

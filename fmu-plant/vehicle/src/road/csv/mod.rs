@@ -12,7 +12,7 @@ use crate::Error;
 use table::{Column, Table};
 
 /// Grid that tables are resampled to [m].
-const STEP: f64 = 0.05;
+const STEP: f64 = 0.1;
 /// Longest road that a table may describe [m]; the resampled tables then take some 100 MB.
 const LENGTH_MAX: f64 = 100_000.0;
 
