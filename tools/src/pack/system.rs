@@ -1,4 +1,4 @@
-//! The wired system as an SSP 1.0 archive: both FMUs, connections by name, a parameter set for each manoeuvre.
+//! The wired system as an SSP 1.0 archive: both FMUs, connections by name, parameter sets.
 //!
 //! `[SSP]` is System Structure and Parameterization 1.0, whose schemas fix names and order of the elements.
 
@@ -9,34 +9,52 @@ use crate::interface::{Interface, Kind, Variable};
 use crate::workspace::{CONTROLLER, Model, PLANT, SYSTEM};
 use crate::xml::Element;
 
-/// A manoeuvre as values of the plant's parameters.
-struct Manoeuvre {
+/// A named set of parameter values for one component.
+struct ParameterSet {
     name: &'static str,
-    values: &'static [(&'static str, &'static str)],
+    values: Vec<(&'static str, String)>,
 }
 
+/// The manoeuvres that are driven in closed loop, the default one last.
+///
 /// Every set gives values to the same parameters, so that the last binding of a component wins as a whole, [SSP, 4.5.4]:
 /// a tool that applies all of them runs the lane change, and one that selects by name runs what was asked for.
-const MANOEUVRES: [Manoeuvre; 2] = [
-    Manoeuvre { name: "general", values: &[("road", "general"), ("speed", "14")] },
-    Manoeuvre { name: "double_lane_change", values: &[("road", "double_lane_change"), ("speed", "14")] },
-];
+fn manoeuvres() -> Vec<ParameterSet> {
+    ["general", "iso_3888_1", "iso_3888_2", "constant_radius", "circuit", "double_lane_change"]
+        .map(|name| ParameterSet { name, values: vec![("road", name.to_owned()), ("speed", "14".to_owned())] })
+        .into()
+}
+
+/// The controller's tuning: the paper's, and the shipped one, which is the default.
+fn tunings(controller: &Interface) -> Result<Vec<ParameterSet>> {
+    let paper = lpv_mpc::Parameters::paper();
+    let values = vec![
+        ("horizon", paper.horizon.to_string()),
+        ("q_v_x", paper.q_v_x.to_string()),
+        ("r_delta", paper.r_delta.to_string()),
+        ("r_a_x", paper.r_a_x.to_string()),
+    ];
+    let shipped = values
+        .iter()
+        .map(|(name, _)| {
+            let start = controller.variable(name)?.start.clone();
+            Ok((*name, start.with_context(|| format!("parameter {name} has no start value"))?))
+        })
+        .collect::<Result<_>>()?;
+    Ok(vec![ParameterSet { name: "paper_weights", values }, ParameterSet { name: "shipped_weights", values: shipped }])
+}
 
 /// Collects the files of the system; `files` holds the two FMUs already.
 pub fn of(controller: &Interface, plant: &Interface, mut files: Files) -> Result<Files> {
     let wires = wires(controller, plant)?;
-    for manoeuvre in &MANOEUVRES {
-        let path = format!("resources/{}.ssv", manoeuvre.name);
-        files.add(&path, parameter_set(manoeuvre, plant)?.document()?)?;
+    let (manoeuvres, tunings) = (manoeuvres(), tunings(controller)?);
+    for (set, interface) in manoeuvres.iter().map(|set| (set, plant)).chain(tunings.iter().map(|set| (set, controller)))
+    {
+        files.add(&format!("resources/{}.ssv", set.name), parameter_set(set, interface)?.document()?)?;
     }
-    let bindings = Element::new("ssd:ParameterBindings").extend(MANOEUVRES.iter().map(|manoeuvre| {
-        Element::new("ssd:ParameterBinding")
-            .with("type", "application/x-ssp-parameter-set")
-            .with("source", &format!("resources/{}.ssv", manoeuvre.name))
-    }));
     let elements = Element::new("ssd:Elements")
-        .child(component(PLANT, plant, &wires, Some(bindings), 0.0))
-        .child(component(CONTROLLER, controller, &wires, None, 100.0));
+        .child(component(PLANT, plant, &wires, &manoeuvres, 0.0))
+        .child(component(CONTROLLER, controller, &wires, &tunings, 100.0));
     let connections = Element::new("ssd:Connections").extend(wires.iter().map(|wire| {
         Element::new("ssd:Connection")
             .with("startElement", wire.from.component)
@@ -110,7 +128,7 @@ fn ensure_alike(output: &Variable, input: &Variable) -> Result<()> {
 /// A component with the connectors that are wired and the outputs worth plotting. The predicted trajectories are left out:
 /// a tool that records every connector would spend most of its time on them. An input without a wire is left out too,
 /// because some tools take every listed input for a connected one; its start value stands.
-fn component(model: Model, interface: &Interface, wires: &[Wire], bindings: Option<Element>, left: f64) -> Element {
+fn component(model: Model, interface: &Interface, wires: &[Wire], sets: &[ParameterSet], left: f64) -> Element {
     let wired = |variable: &Variable| wires.iter().any(|wire| wire.name == variable.name);
     let connectors = interface
         .variables
@@ -124,6 +142,11 @@ fn component(model: Model, interface: &Interface, wires: &[Wire], bindings: Opti
         .map(connector);
     let geometry =
         Element::new("ssd:ElementGeometry").with("x1", &left).with("y1", &0).with("x2", &(left + 60.0)).with("y2", &60);
+    let bindings = Element::new("ssd:ParameterBindings").extend(sets.iter().map(|set| {
+        Element::new("ssd:ParameterBinding")
+            .with("type", "application/x-ssp-parameter-set")
+            .with("source", &format!("resources/{}.ssv", set.name))
+    }));
     Element::new("ssd:Component")
         .with("name", model.component)
         .with("description", &interface.description)
@@ -132,7 +155,7 @@ fn component(model: Model, interface: &Interface, wires: &[Wire], bindings: Opti
         .with("implementation", "CoSimulation")
         .child(Element::new("ssd:Connectors").extend(connectors))
         .child(geometry)
-        .extend(bindings)
+        .child(bindings)
 }
 
 fn connector(variable: &Variable) -> Element {
@@ -183,23 +206,23 @@ fn enumerations(interfaces: &[&Interface]) -> Option<Element> {
     (!list.is_empty()).then(|| Element::new("ssd:Enumerations").extend(list))
 }
 
-fn parameter_set(manoeuvre: &Manoeuvre, plant: &Interface) -> Result<Element> {
+fn parameter_set(set: &ParameterSet, interface: &Interface) -> Result<Element> {
     let mut parameters = Element::new("ssv:Parameters");
-    for (name, value) in manoeuvre.values {
-        let variable = plant.variable(name)?;
-        ensure!(variable.causality == "parameter", "{name} is no parameter of the plant");
+    for (name, value) in &set.values {
+        let variable = interface.variable(name)?;
+        ensure!(variable.causality == "parameter", "{name} is no parameter of {}", interface.model_name);
         let typed = Element::new(&format!("ssv:{}", variable.kind.name()))
-            .with("value", *value)
+            .with("value", value)
             .with_some("unit", variable.unit.as_ref());
         parameters = parameters.child(Element::new("ssv:Parameter").with("name", name).child(typed));
     }
-    let mut units = units(&[plant]);
+    let mut units = units(&[interface]);
     "ssv:Units".clone_into(&mut units.name);
     Ok(Element::new("ssv:ParameterSet")
         .with("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues")
         .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")
         .with("version", "1.0")
-        .with("name", manoeuvre.name)
+        .with("name", set.name)
         .child(parameters)
         .child(units))
 }
