@@ -153,6 +153,8 @@ pub fn table() -> &'static Table<VehiclePlant> {
         Parameter radius ["m"] "Radius of the manoeuvre constant_radius, positive to the left, at least 5 to either side", min P_MIN.radius, max P_MAX.radius => parameters.radius;
         Parameter laps "Laps of a closed track until it is finished", min P_MIN.laps as f64, max P_MAX.laps as f64 => parameters.laps;
         Output lap "Completed laps of a closed track", depends &[] => outputs.lap;
+        Output slip_f ["1"] "Front slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &["delta"] => outputs.slip_f;
+        Output slip_r ["1"] "Rear slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &[] => outputs.slip_r;
     }
 }
 

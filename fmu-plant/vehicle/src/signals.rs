@@ -122,6 +122,10 @@ pub struct Outputs<D = f64> {
     pub grip_usage: D,
     /// Speed of the wind where the vehicle is [m/s].
     pub wind_speed_actual: D,
+    /// Front slip angle over that of the peak force, 0 if the tyre has no peak [1].
+    pub slip_f: D,
+    /// Rear slip angle over that of the peak force, 0 if the tyre has no peak [1].
+    pub slip_r: D,
     /// Whether the end of the road is reached.
     pub finished: bool,
     /// Completed laps of a closed track.
@@ -161,6 +165,8 @@ impl<D: Scalar> Outputs<D> {
             a_x_actual: a_x,
             grip_usage: grip_usage(evaluation),
             wind_speed_actual: length(wind),
+            slip_f: evaluation.slip_f,
+            slip_r: evaluation.slip_r,
             finished,
             lap,
             cones_hit,
@@ -193,6 +199,8 @@ impl Outputs<Dual64> {
             a_x_actual: self.a_x_actual.eps,
             grip_usage: self.grip_usage.eps,
             wind_speed_actual: self.wind_speed_actual.eps,
+            slip_f: self.slip_f.eps,
+            slip_r: self.slip_r.eps,
             finished: self.finished,
             lap: self.lap,
             cones_hit: self.cones_hit,

@@ -106,6 +106,26 @@ impl Axle {
         }
     }
 
+    /// Slip angle of the largest force [rad]; none if the force rises for ever.
+    #[must_use]
+    pub fn peak_slip(&self) -> Option<f64> {
+        let Self::MagicFormula(Pacejka { b, c, e }) = *self else { return None };
+        // The sine peaks where C atan(..) is a right angle; with C below 1 it never gets there.
+        if c <= 1.0 {
+            return None;
+        }
+        let wanted = (std::f64::consts::FRAC_PI_2 / c).tan();
+        // x - E (x - atan x) = wanted: rising and concave or convex throughout for E <= 1, so Newton's method converges
+        // from below; with E = 1 it levels off at a right angle and may never reach the peak.
+        let mut x = wanted;
+        for _ in 0..60 {
+            let (value, slope) = (x - e * (x - x.atan()), 1.0 - e + e / (1.0 + x * x));
+            x += (wanted - value) / slope.max(1e-9);
+        }
+        let reached = (x - e * (x - x.atan()) - wanted).abs() < 1e-9 * (1.0 + wanted);
+        (reached && x > 0.0).then_some(x / b)
+    }
+
     /// Slope of the force at zero slip [N/rad].
     pub fn cornering_stiffness<D: Scalar>(&self, mu: D, load: D) -> D {
         match *self {
@@ -122,4 +142,36 @@ impl Axle {
 pub fn secant_stiffness<D: Scalar>(force: D, alpha: D, c_0: D) -> D {
     const EPSILON_SQUARED: f64 = 1e-12;
     (force * alpha + c_0 * EPSILON_SQUARED) / (alpha * alpha + EPSILON_SQUARED)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn force_peaks_at_the_peak_slip() {
+        for (c, e) in [(1.4, 0.0), (1.3, 0.5), (1.9, -3.0), (1.6, 0.9), (1.05, -0.5)] {
+            let axle = Axle::MagicFormula(Pacejka { b: 10.0, c, e });
+            let peak = axle.peak_slip().unwrap();
+            let force = |alpha: f64| axle.force(alpha, 0.8, 5000.0);
+            assert!((force(peak) - 4000.0).abs() < 1e-6, "C {c}, E {e}: {} N at {peak} rad", force(peak));
+            assert!(force(0.9 * peak) < force(peak) && force(1.2 * peak) < force(peak), "C {c}, E {e}");
+        }
+    }
+
+    #[test]
+    fn tyres_without_a_falling_branch_have_no_peak() {
+        for axle in [Axle::Linear(10.0), Axle::MagicFormula(Pacejka { b: 8.0, c: 1.0, e: 0.0 })] {
+            assert_eq!(axle.peak_slip(), None);
+        }
+    }
+
+    #[test]
+    fn force_is_odd_and_zero_at_zero_slip() {
+        let axle = Axle::MagicFormula(Pacejka { b: 10.0, c: 1.4, e: -0.7 });
+        assert_eq!(axle.force(0.0, 0.8, 5000.0), 0.0);
+        for alpha in [1e-3, 0.1, 0.7] {
+            assert_eq!(axle.force(alpha, 0.8, 5000.0), -axle.force(-alpha, 0.8, 5000.0));
+        }
+    }
 }

@@ -104,6 +104,8 @@ impl Dynamics {
             f_yr,
             peak_f: front.mu * front.load,
             peak_r: rear.mu * rear.load,
+            slip_f: alpha_f.abs() * self.peak_slip_inverse[0],
+            slip_r: alpha_r.abs() * self.peak_slip_inverse[1],
             left_f: front.left,
             left_r: rear.left,
             c_f,

@@ -95,6 +95,10 @@ pub struct Evaluation<D> {
     pub peak_f: D,
     /// Grip of the rear axle, mu F_z [N].
     pub peak_r: D,
+    /// Front slip angle over that of the peak force, 0 if there is no peak [1].
+    pub slip_f: D,
+    /// Rear slip angle over that of the peak force, 0 if there is no peak [1].
+    pub slip_r: D,
     /// What drive or brakes leave of the front axle's lateral force [1].
     pub left_f: D,
     /// What they leave of the rear axle's [1].
@@ -125,6 +129,8 @@ pub struct Dynamics {
     relaxation: f64,
     front: Axle,
     rear: Axle,
+    /// Inverse slip angles of the peak forces, 0 without a peak [1/rad].
+    peak_slip_inverse: [f64; 2],
     grip: Grip,
     aero: Aero,
     kinematic: Kinematic,
@@ -148,6 +154,7 @@ impl Dynamics {
             relaxation: if relaxation_length > 0.0 { 1.0 / relaxation_length } else { 0.0 },
             front,
             rear,
+            peak_slip_inverse: [front, rear].map(|axle| axle.peak_slip().map_or(0.0, f64::recip)),
             grip: Grip::new(parameters),
             aero: Aero::new(parameters),
             kinematic: Kinematic { mass: m, i_z, l_f, l_r },
