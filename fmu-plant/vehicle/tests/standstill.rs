@@ -36,6 +36,24 @@ fn starts_stops_stays_and_drives_away() {
 }
 
 #[test]
+fn from_standstill_to_forty_metres_per_second_nothing_jumps() {
+    let mut car = vehicle("straight", Parameters { v_x_0: 0.0, c_d: 0.0, c_s: 0.0, ..Parameters::default() });
+    let inputs = Inputs { delta: 0.002, a_x: 3.0, ..Inputs::default() };
+    car.advance(1e-3, &inputs).unwrap();
+    let mut before = car.outputs();
+    while before.v_x_true < 40.0 {
+        car.advance(1e-3, &inputs).unwrap();
+        let now = car.outputs();
+        assert!(now.v_x_true > before.v_x_true && now.yaw_rate_true > before.yaw_rate_true, "{now:?}");
+        // The fastest changes are the fading-in of rolling resistance, 0.15 m/s2 over 0.17 s, and of the blend.
+        for (name, a, b) in [("a_lat", now.a_lat, before.a_lat), ("a_long", now.a_long, before.a_long)] {
+            assert!((a - b).abs() < 5e-3, "{name} jumps from {b} to {a} at {} m/s", now.v_x_true);
+        }
+        before = now;
+    }
+}
+
+#[test]
 fn brakes_end_in_standstill_and_never_in_reverse() {
     for a_x in [-0.5, -2.0, -8.0] {
         let mut vehicle = vehicle("straight", Parameters { v_x_0: 6.0, ..Parameters::default() });

@@ -3,14 +3,16 @@
 //! Slip angles lose their meaning at standstill, where they divide by zero. Below [`BLEND_FROM`] the kinematic
 //! single-track model takes over: lateral velocity and yaw rate follow `v_x tan(delta)` within [`TAU`], and the
 //! longitudinal motion carries the inertia of all three. In between, both models' rates are mixed by a smooth step of
-//! `v_x`, so that the right-hand side is twice continuously differentiable. commonroad-vehicle-models and VDSim switch
-//! in the same place.
+//! `v_x`, so that the right-hand side is twice continuously differentiable. commonroad-vehicle-models and VDSim change
+//! over to the same model, the former at 0.1 m/s and with a jump.
 
 use crate::{Scalar, smooth};
 
-/// Below this speed the motion is kinematic [m/s].
+/// Below this speed the motion is kinematic [m/s]: the tyres would settle within 10 ms there, so that rolling is all that
+/// remains of them.
 pub const BLEND_FROM: f64 = 1.0;
-/// From this speed on it is dynamic, exactly [m/s].
+/// From this speed on it is dynamic, exactly [m/s]: walking pace, and above [`super::V_GUARD`], so that the guard is never
+/// seen outside of the mixture.
 pub const BLEND_TO: f64 = 3.0;
 /// How fast lateral velocity and yaw rate join the rolling motion [s]: the time in which tyres do it at 2 m/s.
 pub const TAU: f64 = 0.02;
