@@ -2,6 +2,7 @@
 
 pub mod archive;
 pub mod bench;
+pub mod campaign;
 pub mod demo;
 pub mod html;
 pub mod importer;
@@ -40,6 +41,7 @@ pub struct Cli {
 #[derive(Clone, Debug, Subcommand)]
 enum Command {
     Bench(bench::Args),
+    Campaign(campaign::Args),
     Demo(demo::Args),
     Merge(pack::merge::Args),
     Pack(pack::Args),
@@ -53,6 +55,7 @@ impl Cli {
         let output = Output::default();
         match &self.command {
             Command::Bench(args) => bench::run(args, &output),
+            Command::Campaign(args) => campaign::run(args, &output),
             Command::Demo(args) => demo::run(args, &output),
             Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),
