@@ -38,7 +38,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 fn shipped() -> Network {
-    Network::from_json(include_str!("../../resources/jordan.json")).unwrap()
+    Network::from_json(include_str!("../../resources/jordan.json")).expect("the shipped network is valid")
 }
 
 /// `dry_asphalt`, written down again: force over `mu F_z` and its slope at slip `alpha`, [Pacejka, eq. (4.49)].

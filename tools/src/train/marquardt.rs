@@ -157,7 +157,7 @@ impl Marquardt {
         // What the quadratic model promises for the step that was taken.
         let promised = -(normal.gradient.dot(&taken) + 0.5 * taken.dot(&(&normal.hessian * &taken)));
         // Not a number is no gain.
-        if !(gain > 0.0) {
+        if gain.is_nan() || gain <= 0.0 {
             return self.reject();
         }
         // Nielsen's rule: the better the promise was kept, the less damping.

@@ -1,6 +1,6 @@
 //! One training from the first manoeuvre to the written file, interrupted and resumed as its user likes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
@@ -114,7 +114,7 @@ fn second_order(
     Ok(Outcome { theta: best.best.clone(), curve: best.curve.clone() })
 }
 
-fn read_checkpoint(recipe: &Recipe, file: &PathBuf) -> Result<Vec<Start>> {
+fn read_checkpoint(recipe: &Recipe, file: &Path) -> Result<Vec<Start>> {
     let text = read_text(file).context("there is no interrupted training to resume")?;
     let checkpoint: Checkpoint = serde_json::from_str(&text).with_context(|| format!("in {}", file.display()))?;
     ensure!(checkpoint.recipe == *recipe, "{} belongs to a training with other settings", file.display());
