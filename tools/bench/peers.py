@@ -10,6 +10,7 @@ solvers that could be imported. Files are in the format of fmu-controller/lpv-mp
 """
 
 import json
+import os
 import sys
 from functools import lru_cache
 
@@ -92,18 +93,20 @@ class Daqp:
         self.solve_qp, self.warm = daqp.solve, None
 
     def solve(self, file, qp):
-        A = np.vstack([qp.D, qp.S])
+        # Its own soft constraints weigh the violation of scaled rows, which is another problem.
+        H, f, G, low, high, x_low, x_high = qp.with_slacks(file.soft)
         n, m = qp.H.shape[0], qp.S.shape[0]
-        sense = np.zeros(2 * n + m, dtype=np.int32)
-        sense[2 * n :] = 8
-        upper = np.concatenate([qp.high, qp.d_high, qp.s_high])
-        lower = np.concatenate([qp.low, qp.d_low, qp.s_low])
+        low, high = np.concatenate([x_low, low]), np.concatenate([x_high, high])
+        low, high = np.maximum(low, -1e30), np.minimum(high, 1e30)
+        sense = np.zeros(len(low), dtype=np.int32)
         warm = {} if self.warm is None else {"dual_start": self.warm}
-        u, _, flag, info = self.solve_qp(qp.H, qp.f, A, upper, lower, sense, rho_soft=1 / (2 * file.soft), **warm)
+        u, _, flag, info = self.solve_qp(H, f, G, high, low, sense, **warm)
         self.warm = np.array(info["lam"])
-        for first, last, step in ((0, n, NU), (n, 2 * n, NU), (2 * n, 2 * n + m, 1)):
+        rates = n + m
+        blocks = ((0, n, NU), (rates, rates + n, NU), (rates + n, rates + n + m, 1), (rates + n + m, rates + n + 2 * m, 1))
+        for first, last, step in blocks:
             self.warm[first : last - step] = info["lam"][first + step : last]
-        return info["setup_time"] + info["solve_time"], u[:NU], flag in (1, 2)
+        return info["setup_time"] + info["solve_time"], u[:NU], flag == 1
 
 
 class Piqp:
@@ -206,8 +209,11 @@ def available():
 
 
 def main():
+    # Some solvers print to standard output whatever they are told; answers get a channel of their own.
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     solvers, running = available(), {}
-    print(json.dumps(sorted(solvers)), flush=True)
+    print(json.dumps(sorted(solvers)), file=answers, flush=True)
     for line in sys.stdin:
         request = json.loads(line)
         name, path, horizon = request["solver"], request["file"], request["horizon"]
@@ -226,7 +232,7 @@ def main():
             answer["seconds"].append(float(seconds))
             answer["u"].append([float(value) if np.isfinite(value) else 0.0 for value in u])
             answer["solved"].append(bool(solved))
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 if __name__ == "__main__":
