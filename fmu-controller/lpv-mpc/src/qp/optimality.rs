@@ -25,6 +25,7 @@ pub fn costates<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, sol
 /// Gradient of the cost with respect to each input of sample `i` along the dynamics, and the scale to judge it by: the
 /// input's own curvature times its range, plus the magnitudes of the terms that cancel.
 #[must_use]
+#[inline(always)]
 pub fn gradient<const NX: usize, const NU: usize>(
     problem: &Problem<NX, NU>,
     solution: &Solution<NX, NU>,
