@@ -63,15 +63,17 @@ impl Model for LpvMpcController {
 
     fn initialize(&mut self, experiment: &Experiment<'_>, log: &mut dyn Log) -> Result<(), Error> {
         let parameters = self.parameters.clone();
-        self.controller = if parameters.adaptation == Adaptation::Constant {
-            Controller::new(parameters, experiment.start)?
-        } else {
+        let adapts = parameters.adaptation != Adaptation::Constant;
+        self.controller = if adapts || !self.network_file.trim().is_empty() {
+            // A file that is named is read even when it is not used: a wrong name shall not stay unnoticed.
             let network = network::load(&self.network_file, experiment.resources)?;
-            if let Some(difference) = other_car(&network, &parameters) {
-                let reason = format!("the network is of another car, the stiffnesses stay nominal: {difference}");
+            if let Some(difference) = other_car(&network, &parameters).filter(|_| adapts) {
+                let reason = format!("the network is not of this car, the stiffnesses stay nominal: {difference}");
                 log.log(Category::Warning, &reason);
             }
             Controller::with_network(parameters, experiment.start, network)?
+        } else {
+            Controller::new(parameters, experiment.start)?
         };
         self.output.clone_from(self.controller.output());
         Ok(())

@@ -5,6 +5,7 @@
 //! stage at a time, so that every stage has the tyre where it will be (`network_horizon`). Tangents carry the answer into the
 //! model: near the peak of the force the secant promises a response to steering that the tyre does not give.
 
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
@@ -22,9 +23,13 @@ const TANGENT_FLOOR: f64 = 0.05;
 /// Relative difference of a parameter from which on a car is not the one that a network was trained for [1].
 const SAME_CAR: f64 = 0.01;
 
-/// Where the car that a network was trained for differs from the one of the parameters; nothing if it is the same car.
+/// Why a network cannot serve the car of the parameters: what it was trained for differs, or it wants to see more than the
+/// controller does. Nothing if it fits.
 pub fn other_car(network: &Network, p: &Parameters) -> Option<String> {
     let Document { l_f, l_r, c_f_nominal, c_r_nominal, .. } = network.document();
+    if network.sees_accelerations() {
+        return Some("it wants measured accelerations, which the controller is not given".to_owned());
+    }
     [
         ("l_f", *l_f, p.l_f),
         ("l_r", *l_r, p.l_r),
@@ -96,6 +101,28 @@ impl Adapter {
         &self.present
     }
 
+    /// The network's last answer.
+    pub(crate) fn memory(&self) -> Memory {
+        self.memory
+    }
+
+    /// The tyres around a sample that began with the network's answer `before`, as its state moves along `x.eps`.
+    pub(crate) fn neighbours(&self, before: Memory, x: &State<Dual64>, u: &Input) -> Option<Neighbours> {
+        if self.mode == Adaptation::Constant {
+            return None;
+        }
+        let largest = x.iter().fold(SMALLEST_MOVE, |largest: f64, x| largest.max(x.eps.abs()));
+        let distance = DISTANCE / largest;
+        let sides = [distance, -distance].map(|distance| {
+            let mut side = self.clone();
+            side.memory = before;
+            side.observe(&x.map(|x| x.re + distance * x.eps), u);
+            side.restart();
+            side
+        });
+        Some(Neighbours { sides, distance })
+    }
+
     /// Secant stiffnesses, front and rear [N/rad], and how far the network is believed [1], at the last measurement.
     pub fn believed(&self) -> (f64, f64, f64) {
         self.believed
@@ -115,6 +142,50 @@ impl Adapter {
             ..Measured::default()
         };
         Some(self.network.as_ref()?.linearise(memory, &measured))
+    }
+}
+
+/// The same tyres a small distance ahead and behind along a direction: their derivative is a central difference.
+///
+/// The tangents already hold the network's first derivatives, so exact ones would need its second derivatives along every
+/// direction. The network is smooth on the scale of its training data, where a distance of 1e-4 leaves errors of 1e-8.
+pub(crate) struct Neighbours {
+    sides: [Adapter; 2],
+    distance: f64,
+}
+
+/// Distance of the neighbours, in units of the states [m/s, rad/s, m, rad].
+const DISTANCE: f64 = 1e-4;
+
+/// Smallest move of a state for which the distance is still measured by it: curvature and wanted speed do not move the
+/// measured state itself, only where it goes.
+const SMALLEST_MOVE: f64 = 1e-3;
+
+impl Neighbours {
+    /// The tyres at the measurement.
+    pub fn present(&self, value: &Tyres) -> Tyres<Dual64> {
+        self.slope(value, &self.sides[0].present, &self.sides[1].present)
+    }
+
+    /// The tyres of the next stage, which is at `x` and `u`.
+    pub fn at(&mut self, value: &Tyres, x: &State<Dual64>, u: &Input<Dual64>) -> Tyres<Dual64> {
+        let distance = self.distance;
+        let mut side = |i: usize, distance: f64| {
+            let moved = |q: Dual64| q.re + distance * q.eps;
+            self.sides[i].at(&x.map(moved), &u.map(moved))
+        };
+        let (ahead, behind) = (side(0, distance), side(1, -distance));
+        self.slope(value, &ahead, &behind)
+    }
+
+    fn slope(&self, value: &Tyres, ahead: &Tyres, behind: &Tyres) -> Tyres<Dual64> {
+        let slope = |ahead: f64, behind: f64| (ahead - behind) / (2.0 * self.distance);
+        value.with_slope(&Tyres {
+            c_f: slope(ahead.c_f, behind.c_f),
+            c_r: slope(ahead.c_r, behind.c_r),
+            f_f0: slope(ahead.f_f0, behind.f_f0),
+            f_r0: slope(ahead.f_r0, behind.f_r0),
+        })
     }
 }
 

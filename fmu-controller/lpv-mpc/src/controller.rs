@@ -10,7 +10,7 @@ use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
-use crate::mpc::{Mpc, TyreModel};
+use crate::mpc::Mpc;
 use crate::parameters::{Adaptation, Estimation, HORIZON_MAX};
 use crate::qp::Problem;
 use crate::sensitivity::{self, Snapshot};
@@ -195,7 +195,7 @@ impl Controller {
         self.snapshot.inputs.clone_from(inputs);
         self.snapshot.estimator.clone_from(&self.estimator);
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
-        self.snapshot.tyres[0] = *self.beliefs.tyres.present();
+        (self.snapshot.tyres[0], self.snapshot.memory) = (*self.beliefs.tyres.present(), self.beliefs.tyres.memory());
         let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
@@ -220,10 +220,10 @@ impl Controller {
 
     /// Derivative of the output along a `direction` of the inputs that were held during the last communication step.
     ///
-    /// The result is an [`Output`] whose quantities are derivatives; status, iterations, stiffnesses and residual have none
-    /// and are zero. The command and plan of a step in which no sample was taken, or no new plan was found, do not depend
+    /// The result is an [`Output`] whose quantities are derivatives; those of status, iterations, beliefs and residual are not
+    /// followed and zero. The command and plan of a step in which no sample was taken, or no new plan was found, do not depend
     /// on its inputs: all derivatives are zero. Where an infinitesimal change alters the active set the derivative of the side
-    /// on which the solver ended is returned; tyres that the network gave are held.
+    /// on which the solver ended is returned.
     ///
     /// # Errors
     /// [`Error::NoDerivative`] when the plan is not an exact optimum, is the first one (it finds its own schedule in several
@@ -236,7 +236,7 @@ impl Controller {
             return Err(Error::NoDerivative("several samples were taken in one step"));
         }
         let Self { parameters, beliefs: Beliefs { body, tyres }, latency, snapshot, .. } = self;
-        let given = (parameters, body, tyres.nominal(), latency);
+        let given = (parameters, body, tyres, latency);
         with_mpc!(&self.core, mpc => sensitivity::along(mpc, snapshot, direction, given))
             .ok_or(Error::NoDerivative("the plan is the first one or not an exact optimum"))
     }
@@ -266,6 +266,9 @@ impl Controller {
         output.status = status;
         with_mpc!(&self.core, mpc => {
             (output.iterations, output.kkt_residual, output.slack_e_y) = mpc.diagnostics();
+            // Without an answer they are infinite, which not every importer can show.
+            (output.kkt_residual, output.slack_e_y) =
+                (output.kkt_residual.min(f64::MAX), output.slack_e_y.min(f64::MAX));
             let last = mpc.plan.u.len() - 1;
             for i in 0..HORIZON_MAX {
                 output.set_stage(i, &vehicle_part(&mpc.plan.x[i.min(last) + 1]), &mpc.plan.u[i.min(last)]);

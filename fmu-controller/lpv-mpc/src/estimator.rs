@@ -73,7 +73,7 @@ impl<T: Scalar> Estimator<T> {
         input: &Input,
         duration: f64,
         body: &Body,
-        tyres: &Tyres,
+        tyres: &Tyres<T>,
     ) -> bool {
         let complete = measured.iter().all(|z| z.re().is_finite());
         let kappa = if kappa.re().is_finite() { kappa } else { self.kappa };
@@ -129,7 +129,7 @@ impl<T: Scalar> Estimator<T> {
         SENSOR_DEVIATION[i] * self.sensor_noise
     }
 
-    fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres) {
+    fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres<T>) {
         let hold = Hold::new(duration, [0.0, 0.0]);
         let input = input.map(T::from);
         let move_on = |x: &State<T>| {
@@ -153,11 +153,8 @@ impl<T: Scalar> Estimator<T> {
             }
             self.P.transpose_mut();
         }
-        for i in 0..NX {
-            self.P[(i, i)] += T::from(MODEL[i] * MODEL[i] * duration);
-        }
-        for j in 0..3 {
-            self.P[(NX + j, NX + j)] += T::from(WALK[j] * WALK[j] * duration);
+        for (i, intensity) in MODEL.iter().chain(&WALK).enumerate() {
+            self.P[(i, i)] += T::from(intensity * intensity * duration);
         }
         self.x = x;
     }

@@ -70,7 +70,7 @@ pub fn middle<T: Scalar, const N_X: usize>(
 pub fn linearise<T: Scalar, const N_X: usize>(
     (x, u): &(State<T>, Input<T>),
     path: &Path<T>,
-    tyres: &Tyres,
+    tyres: &Tyres<T>,
     around: &Surroundings<'_, T>,
 ) -> Linear<T, N_X> {
     let Surroundings { body, nominal, hold, disturbance } = around;

@@ -110,7 +110,7 @@ impl Latency {
         step: f64,
         kappa: impl Fn(f64) -> T,
         body: &Body,
-        tyres: &Tyres,
+        tyres: &Tyres<T>,
         disturbance: &Disturbance<T>,
     ) -> Predicted<T> {
         let end = self.time + step + self.delay;

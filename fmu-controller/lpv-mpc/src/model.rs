@@ -5,6 +5,7 @@
 //! stiffness has `F_0 = 0`, a tangent model carries the rest of the force in `F_0`.
 
 use nalgebra::{SMatrix, SVector};
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
@@ -64,21 +65,31 @@ pub struct Body {
 
 /// Axle forces as affine functions of the slip angles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Tyres {
+pub struct Tyres<T = f64> {
     /// Front cornering stiffness [N/rad].
-    pub c_f: f64,
+    pub c_f: T,
     /// Rear cornering stiffness [N/rad].
-    pub c_r: f64,
+    pub c_r: T,
     /// Front lateral force at zero slip of the affine model; 0 for a secant stiffness [N].
-    pub f_f0: f64,
+    pub f_f0: T,
     /// Rear lateral force at zero slip of the affine model; 0 for a secant stiffness [N].
-    pub f_r0: f64,
+    pub f_r0: T,
 }
 
 impl Tyres {
     /// Secant stiffnesses: forces proportional to slip.
     pub fn secant(c_f: f64, c_r: f64) -> Self {
         Self { c_f, c_r, f_f0: 0.0, f_r0: 0.0 }
+    }
+
+    /// These tyres with the derivatives `slope`.
+    pub(crate) fn with_slope(&self, slope: &Self) -> Tyres<Dual64> {
+        Tyres {
+            c_f: Dual64::new(self.c_f, slope.c_f),
+            c_r: Dual64::new(self.c_r, slope.c_r),
+            f_f0: Dual64::new(self.f_f0, slope.f_f0),
+            f_r0: Dual64::new(self.f_r0, slope.f_r0),
+        }
     }
 }
 
@@ -122,7 +133,7 @@ pub fn derivative<T: Scalar>(
     u: &Input<T>,
     kappa: T,
     body: &Body,
-    tyres: &Tyres,
+    tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> State<T> {
     let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
@@ -165,7 +176,7 @@ pub fn embed<T: Scalar>(
     u: &Input<T>,
     kappa: T,
     body: &Body,
-    tyres: &Tyres,
+    tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> Lpv<T> {
     let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
@@ -211,9 +222,9 @@ pub fn embed<T: Scalar>(
 }
 
 /// Rate of the fastest lateral mode for small slip, a bound by the traces of the velocity and the yaw equation [1/s].
-pub fn fastest_rate(v_x: f64, body: &Body, tyres: &Tyres) -> f64 {
+pub fn fastest_rate<T: Scalar>(v_x: f64, body: &Body, tyres: &Tyres<T>) -> f64 {
     let Body { m, i_z, l_f, l_r, .. } = *body;
-    let (c_f, c_r) = (tyres.c_f.abs(), tyres.c_r.abs());
+    let (c_f, c_r) = (tyres.c_f.re().abs(), tyres.c_r.re().abs());
     ((c_f + c_r) / m).max((c_f * l_f * l_f + c_r * l_r * l_r) / i_z) / v_x.max(V_GUARD)
 }
 

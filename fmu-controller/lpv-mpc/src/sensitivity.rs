@@ -3,18 +3,20 @@
 //! The sample is differentiated in two parts. What comes before the quadratic programme (filter, latency, schedule, model) runs
 //! once more on dual numbers, which carry exact derivatives; the programme itself is differentiated through its conditions of
 //! optimality on the final active set. There is no derivative where an infinitesimal change alters the active set: the one of
-//! the side on which the solver ended is returned. Tyres that the network gave are taken as they are, its dependence on the
-//! measurement is left out.
+//! the side on which the solver ended is returned. Tyres that the network gives are followed by central differences of the
+//! network, whose tangents are derivatives already ([`crate::adaptation`]).
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
+use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
 use crate::horizon::{Path, Surroundings, full_state, linearise, middle, vehicle_part};
-use crate::latency::{Latency, Predicted};
+use crate::jordan::Memory;
+use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
-use crate::mpc::Mpc;
+use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::{Estimation, HORIZON_MAX};
 use crate::qp::{Perturbation, Stage};
 use crate::{Inputs, Output, Parameters};
@@ -30,6 +32,8 @@ pub(crate) struct Snapshot {
     pub delivered: Input,
     /// Tyres of the filter and of the prediction over the latency.
     pub tyres: [Tyres; 2],
+    /// The network's answer before the sample.
+    pub memory: Memory,
     /// Communication step [s].
     pub step: f64,
 }
@@ -48,6 +52,7 @@ impl Snapshot {
             duration: 0.0,
             delivered: Input::zeros(),
             tyres: [*tyres; 2],
+            memory: Memory::default(),
             step: 0.0,
         }
     }
@@ -63,22 +68,15 @@ impl Snapshot {
         }
         let kappa = dual(self.inputs.kappa_ref[0], direction.kappa_ref[0]);
         let mut estimator = self.estimator.to_dual();
-        estimator.update(&measured, kappa, &self.delivered, self.duration, body, &self.tyres[0]);
+        let tyres = fixed(&self.tyres[0]);
+        estimator.update(&measured, kappa, &self.delivered, self.duration, body, &tyres);
         (estimator.x, estimator.disturbance)
     }
+}
 
-    /// State and disturbance when the command acts.
-    fn predict(
-        &self,
-        direction: &Inputs,
-        p: &Parameters,
-        body: &Body,
-        latency: &Latency,
-    ) -> (Predicted<Dual64>, Disturbance<Dual64>) {
-        let (x, disturbance) = self.estimate(direction, p, body);
-        let kappa = |s: f64| dual(self.inputs.curvature(s / p.t_s), direction.curvature(s / p.t_s));
-        (latency.predict(&x, self.step, kappa, body, &self.tyres[1], &disturbance), disturbance)
-    }
+/// Tyres that do not move.
+fn fixed(tyres: &Tyres) -> Tyres<Dual64> {
+    tyres.with_slope(&Tyres { c_f: 0.0, c_r: 0.0, f_f0: 0.0, f_r0: 0.0 })
 }
 
 /// Derivative of the plan of the last sample along `direction`, written as an [`Output`] whose quantities are derivatives.
@@ -88,7 +86,7 @@ pub(crate) fn along<const N_X: usize>(
     mpc: &Mpc<N_X>,
     snapshot: &Snapshot,
     direction: &Inputs,
-    (p, body, nominal, latency): (&Parameters, &Body, Tyres, &Latency),
+    (p, body, adapter, latency): (&Parameters, &Body, &Adapter, &Latency),
 ) -> Option<Output> {
     if !mpc.smooth {
         return None;
@@ -96,10 +94,17 @@ pub(crate) fn along<const N_X: usize>(
     // A preview that is held follows its first element.
     let direction = Inputs { hold_preview: snapshot.inputs.hold_preview, ..direction.clone() };
     let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-    let (at, disturbance) = snapshot.predict(&direction, p, body, latency);
+    let (x, disturbance) = snapshot.estimate(&direction, p, body);
+    let mut neighbours = adapter.neighbours(snapshot.memory, &x, &snapshot.delivered);
+    let present = match &neighbours {
+        Some(neighbours) => neighbours.present(&snapshot.tyres[1]),
+        None => fixed(&snapshot.tyres[1]),
+    };
+    let kappa = |s: f64| dual(snapshot.inputs.curvature(s / p.t_s), direction.curvature(s / p.t_s));
+    let at = latency.predict(&x, snapshot.step, kappa, body, &present, &disturbance);
     let periods = (snapshot.step + p.input_delay) / p.t_s;
     let (reference, slope) = (snapshot.inputs.reference(periods), direction.reference(periods));
-    let around = Surroundings { body, nominal, hold: &hold, disturbance };
+    let around = Surroundings { body, nominal: adapter.nominal(), hold: &hold, disturbance };
 
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);
@@ -112,7 +117,11 @@ pub(crate) fn along<const N_X: usize>(
             kappa: [0, 1].map(|j| dual(path.kappa[j], path_slope.kappa[j])),
             v_x: dual(path.v_x, path_slope.v_x),
         };
-        let linear = linearise::<Dual64, N_X>(&scheduled, &path, &mpc.tyres[i], &around);
+        let tyres = match &mut neighbours {
+            Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.0, &scheduled.1),
+            None => fixed(&mpc.tyres[i]),
+        };
+        let linear = linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around);
         *stage = Stage {
             A: linear.A.map(|a| a.eps),
             B: linear.B.map(|b| b.eps),

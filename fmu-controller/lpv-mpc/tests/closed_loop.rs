@@ -1,4 +1,6 @@
 //! The whole controller in loops whose plant is known exactly: its own nonlinear equations, integrated finely.
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
+#![allow(clippy::cast_possible_truncation, reason = "counts of steps of a few seconds")]
 
 use lpv_mpc::estimator::SENSOR_DEVIATION;
 use lpv_mpc::model::{A_X, DELTA, Disturbance, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE, derivative};

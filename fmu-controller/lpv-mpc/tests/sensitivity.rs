@@ -1,5 +1,10 @@
 //! The exact derivative of command and plan against central differences of whole controller steps.
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
+use std::fs;
+use std::path::Path;
+
+use lpv_mpc::jordan::Network;
 use lpv_mpc::preview::Preview;
 use lpv_mpc::{Controller, Error, Estimation, Inputs, Output, Parameters, Status};
 use rand::{RngExt, SeedableRng};
@@ -69,7 +74,10 @@ fn advanced(controller: &Controller, t: f64, inputs: &Inputs) -> Controller {
 }
 
 fn compare(parameters: &Parameters) {
-    let mut controller = Controller::new(parameters.clone(), 0.0).unwrap();
+    compare_from(Controller::new(parameters.clone(), 0.0).unwrap());
+}
+
+fn compare_from(mut controller: Controller) {
     for k in 0..30 {
         let t = f64::from(k) * H;
         let at = inputs(t);
@@ -106,6 +114,13 @@ fn derivative_goes_through_lags_and_delay() {
 #[test]
 fn derivative_of_the_papers_controller() {
     compare(&Parameters { estimation: Estimation::Measured, ..Parameters::default() });
+}
+
+#[test]
+fn derivative_follows_the_network_along_the_horizon() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../resources/jordan.json");
+    let network = Network::from_json(&fs::read_to_string(file).unwrap()).unwrap();
+    compare_from(Controller::with_network(Parameters::adaptive(), 0.0, network).unwrap());
 }
 
 #[test]
