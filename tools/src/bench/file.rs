@@ -47,7 +47,7 @@ impl File {
         let Some((header, records)) = values.split_at_checked(HEADER) else {
             bail!("it holds {} values, fewer than the {HEADER} of its header", values.len());
         };
-        ensure!(header[0] == 1.0, "its version is {}, not 1", header[0]);
+        ensure!(header[0] == 1.0, "its version is {:e}, not 1", header[0]);
         let horizon = whole("horizon", header[1], 80)?;
         let count = whole("number of records", header[2], 10_000_000)?;
         let length = NX + NU + 2 + 2 * (horizon + 1) + (NX + NU) * horizon + NX * (NX + NU) * horizon;
@@ -103,7 +103,7 @@ mod tests {
             (&good[..good.len() - 3], "no multiple of 8"),
             (&good[..80], "fewer than the 26"),
             (&good[..good.len() - 8], "are promised"),
-            (&version, "version is 2"),
+            (&version, "version is 2e0"),
             (&horizon, "horizon is NaN"),
         ];
         for (bytes, message) in cases {

@@ -128,13 +128,24 @@ fn measure(
             ("clarabel_update", Box::new(General::new(horizon, false))),
             ("clarabel_new", Box::new(General::new(horizon, true))),
         ];
+        for (_, solver) in &mut own {
+            if let Some(problem) = problems.first() {
+                solver.solve(problem);
+                solver.restart();
+            }
+        }
         let mut condenser = Condensing::new(horizon);
         let mut note = |name: &str, first: usize, runs: &[Run]| {
             let best = best.entry(name.to_owned()).or_insert_with(|| Best::new(count));
             best.note(round == 0, first, runs, &problems, &references);
         };
-        for first in (0..count).step_by(args.block as usize) {
-            let block = first..count.min(first + args.block as usize);
+        // The first problem of a block finds cold caches. Each round has its blocks elsewhere, so that no problem is always
+        // the first one.
+        let length = args.block as usize;
+        let offset = length * (round as usize + 1) / args.rounds as usize;
+        let starts = std::iter::once(0).chain((offset..count).step_by(length));
+        for first in starts {
+            let block = first..count.min(if first < offset { offset } else { first + length });
             for (name, solver) in &mut own {
                 let runs: Vec<Run> = problems[block.clone()].iter().map(|problem| solver.solve(problem)).collect();
                 note(name, first, &runs);

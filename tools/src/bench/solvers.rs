@@ -28,6 +28,9 @@ pub struct Run {
 pub trait Solver {
     /// Solves the next problem in the order of time.
     fn solve(&mut self, problem: &Problem) -> Run;
+
+    /// Forgets what earlier problems left behind.
+    fn restart(&mut self);
 }
 
 fn run(seconds: f64, solution: &Solution<NX, NU>, outcome: Outcome) -> Run {
@@ -50,6 +53,10 @@ impl Solver for OnStructure {
         solver.shift();
         solver.solve(black_box(problem), solution);
         run(start.elapsed().as_secs_f64(), black_box(solution), solution.outcome)
+    }
+
+    fn restart(&mut self) {
+        self.0.reset();
     }
 }
 
@@ -75,6 +82,9 @@ impl Solver for General {
         self.solver.solve(black_box(problem), &mut self.solution);
         run(start.elapsed().as_secs_f64(), black_box(&self.solution), self.solution.outcome)
     }
+
+    // The workspace holds no answer, and keeping it is what this form is about.
+    fn restart(&mut self) {}
 }
 
 /// The condensed problem: Hessian, slope.
