@@ -39,8 +39,8 @@ mod warm_start;
 
 pub use tangent::{Perturbation, Tangent};
 
-/// Sweeps before interior points take over. Measured on recorded double lane changes at the limit and saturated loops: of a
-/// thousand hard problems twelve need more, and more sweeps cost more than interior points do.
+/// Sweeps before interior points take over. Measured on 1382 recorded problems at the limit of grip and saturated (N = 10): 17
+/// need more than 20, and no fewer need more than 36; 12 sweeps leave about twice as many to the costlier interior points.
 const SWEEPS_MAX: u32 = 20;
 /// Scaled multiplier of the wrong sign that is rounding.
 const WRONG_SIGN: f64 = 1e-9;
