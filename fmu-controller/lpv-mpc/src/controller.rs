@@ -254,7 +254,10 @@ impl Controller {
             measured[V_Y] = f64::NAN;
         }
         let Beliefs { body, tyres } = &self.beliefs;
-        self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres.present());
+        if self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres.present()) {
+            // Some importers show zeros until the first exchange of values: a plan for a car at rest serves no moving one.
+            with_mpc!(&mut self.core, mpc => mpc.forget());
+        }
         (self.estimator.x, self.estimator.disturbance, complete)
     }
 

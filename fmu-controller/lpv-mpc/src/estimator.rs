@@ -33,6 +33,12 @@ const MODEL: [f64; NX] = [0.003, 0.003, 0.0002, 0.001, 0.0002];
 /// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind.
 const INITIAL: [f64; 3] = [1.0, 1.0, 0.5];
 
+/// Largest difference between measured and estimated speed that is no other car [m/s]: 60 standard deviations of the sensor.
+const JUMP_MAX: f64 = 2.0;
+
+/// What is added to it for each second since the last measurement [m/s2]: twice what tyres give.
+const ACCELERATION_MAX: f64 = 20.0;
+
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimator<T: Scalar = f64> {
@@ -65,7 +71,7 @@ impl<T: Scalar> Estimator<T> {
     /// Moves the estimate on by `duration` [s] under the mean `input`, then corrects it by the measurement.
     ///
     /// `measured` may hold NaN where nothing was measured, `kappa` is the curvature at the measurement [1/m]. Returns whether
-    /// every value was used.
+    /// the filter had to start again, because no car gets from its estimate to that speed.
     pub fn update(
         &mut self,
         measured: &State<T>,
@@ -75,7 +81,6 @@ impl<T: Scalar> Estimator<T> {
         body: &Body,
         tyres: &Tyres<T>,
     ) -> bool {
-        let complete = measured.iter().all(|z| z.re().is_finite());
         let kappa = if kappa.re().is_finite() { kappa } else { self.kappa };
         if !self.started {
             self.start(measured);
@@ -83,10 +88,15 @@ impl<T: Scalar> Estimator<T> {
             self.predict((self.kappa + kappa) * 0.5, input, duration, body, tyres);
         }
         self.kappa = kappa;
+        let jump = (measured[V_X] - self.x[V_X]).re().abs();
+        let restarts = jump > JUMP_MAX + ACCELERATION_MAX * duration;
+        if restarts {
+            self.start(measured);
+        }
         for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.re().is_finite()) {
             self.correct(i, *z);
         }
-        complete
+        restarts
     }
 
     /// The same filter on dual numbers, every derivative zero.

@@ -190,6 +190,11 @@ impl<const N_X: usize> Mpc<N_X> {
         self.solution.outcome
     }
 
+    /// Drops the plan: the next sample begins anew, from steady driving on the reference.
+    pub fn forget(&mut self) {
+        self.plan.age = self.plan.u.len();
+    }
+
     /// Iterations of the solver, its scaled optimality residual, and the largest excess over the soft bound [m].
     pub fn diagnostics(&self) -> (u32, f64, f64) {
         (self.solution.iterations, self.solution.residual, self.solution.slack)

@@ -299,6 +299,20 @@ fn the_previous_plan_is_executed_as_it_was_made() {
 }
 
 #[test]
+fn zeros_before_the_first_exchange_are_forgotten() {
+    for h in [0.001, 0.033] {
+        let mut worst: f64 = 0.0;
+        Loop { h, ..Loop::new(Parameters::default(), slalom) }.drive(
+            8.0,
+            |t, x| if t == 0.0 { State::zeros() } else { *x },
+            |_, x, _| worst = worst.max(x[E_Y].abs()),
+        );
+        // At 1 ms the next measurement comes a whole sample after the zeros.
+        assert!(worst < 0.03, "step {h} s: {worst} m");
+    }
+}
+
+#[test]
 fn good_inputs_recover_from_a_safe_stop() {
     let parameters = Parameters { horizon: 5, ..Parameters::default() };
     let road = Loop::new(parameters.clone(), straight);
