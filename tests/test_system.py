@@ -69,10 +69,8 @@ def test_fmpy_runs_the_system_as_the_direct_wiring(system, plant, controller):
     for ours, theirs in [("e_y_true", "plant.e_y_true"), ("v_x_true", "plant.v_x_true"), ("delta", "controller.delta")]:
         difference = np.abs(result[theirs] - direct[ours]).max()
         assert difference <= SAME, f"{ours} differs by {difference}"
-    # Its zeros in the first step show the controller a car that stands: it recovers within the paper's bound of 0.3 m, and
-    # the manoeuvre is driven.
-    assert np.abs(result["plant.e_y_true"]).max() < 0.3
-    assert np.abs(result["plant.e_y_true"][-100:]).max() < 0.01
+    # Its zeros in the first step show the controller a car that stands; what it expects of the direct wiring holds all the same.
+    assert np.abs(result["plant.e_y_true"]).max() < 0.01
     assert np.ptp(result["plant.y"]) > 3.0
 
 
