@@ -272,6 +272,10 @@ impl Controller {
             // Without an answer they are infinite, which not every importer can show.
             (output.kkt_residual, output.slack_e_y) =
                 (output.kkt_residual.min(f64::MAX), output.slack_e_y.min(f64::MAX));
+            if !mpc.plan.is_left() {
+                // What stands there may not even be finite; the trajectories shown stay those of the last plan.
+                return;
+            }
             let last = mpc.plan.u.len() - 1;
             for i in 0..HORIZON_MAX {
                 output.set_stage(i, &vehicle_part(&mpc.plan.x[i.min(last) + 1]), &mpc.plan.u[i.min(last)]);

@@ -33,11 +33,12 @@ const MODEL: [f64; NX] = [0.003, 0.003, 0.0002, 0.001, 0.0002];
 /// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind.
 const INITIAL: [f64; 3] = [1.0, 1.0, 0.5];
 
-/// Largest difference between measured and estimated speed that is no other car [m/s]: 60 standard deviations of the sensor.
-const JUMP_MAX: f64 = 2.0;
+/// Largest difference between a measurement and its estimate that is no other situation [m/s, m/s, rad/s, m, rad]: 60 and
+/// more standard deviations of the sensors, and more than any car does between two samples.
+const JUMP_MAX: [f64; NX] = [2.0, 2.0, 1.0, 2.0, 0.5];
 
-/// What is added to it for each second since the last measurement [m/s2]: twice what tyres give.
-const ACCELERATION_MAX: f64 = 20.0;
+/// Growth of that difference with the time since the last measurement [1/s]: 20 m/s2 for the velocities, twice what tyres give.
+const JUMP_RATE: f64 = 10.0;
 
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -88,11 +89,12 @@ impl<T: Scalar> Estimator<T> {
             self.predict((self.kappa + kappa) * 0.5, input, duration, body, tyres);
         }
         self.kappa = kappa;
-        let jump = (measured[V_X] - self.x[V_X]).re().abs();
-        let restarts = jump > JUMP_MAX + ACCELERATION_MAX * duration;
-        if restarts {
-            self.start(measured);
-        }
+        let far = |i: usize| {
+            // Written so that an estimate that is no number any more is far from everything.
+            let near = (measured[i] - self.x[i]).re().abs() <= JUMP_MAX[i] * (1.0 + JUMP_RATE * duration);
+            measured[i].re().is_finite() && !near
+        };
+        let restarts = self.started && (0..NX).any(far) && self.start(measured);
         for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.re().is_finite()) {
             self.correct(i, *z);
         }
@@ -119,13 +121,15 @@ impl<T: Scalar> Estimator<T> {
         self.started
     }
 
-    /// Takes the first measurement as it is; a lateral velocity that is not measured starts at zero.
-    fn start(&mut self, measured: &State<T>) {
+    /// Takes a measurement as it is; a lateral velocity that is not measured starts at zero. Returns whether there was enough to
+    /// start from.
+    fn start(&mut self, measured: &State<T>) -> bool {
         let known = [V_X, YAW_RATE, E_Y, E_PSI].iter().all(|i| measured[*i].re().is_finite());
         if !known {
-            return;
+            return false;
         }
         self.started = true;
+        self.disturbance = Disturbance::zeros();
         self.x = measured.map(|z| if z.re().is_finite() { z } else { T::zero() });
         let mut deviation = SVector::<f64, NZ>::zeros();
         for i in 0..NX {
@@ -133,6 +137,7 @@ impl<T: Scalar> Estimator<T> {
         }
         deviation.fixed_rows_mut::<3>(NX).copy_from(&SVector::from(INITIAL));
         self.P = SMatrix::from_diagonal(&deviation.map(|deviation| T::from(deviation * deviation)));
+        true
     }
 
     fn deviation(&self, i: usize) -> f64 {

@@ -313,6 +313,31 @@ fn zeros_before_the_first_exchange_are_forgotten() {
 }
 
 #[test]
+fn extreme_inputs_leave_every_output_finite() {
+    let road = Loop::new(Parameters::default(), slalom);
+    let mut controller = Controller::new(Parameters::default(), 0.0).unwrap();
+    for k in 0..60 {
+        let t = f64::from(k) * 0.033;
+        let mut x = State::from([15.0, 0.0, 0.0, 0.02, 0.0]);
+        x[k as usize % 5] *= if (20..40).contains(&k) { 1e300 } else { 1.0 };
+        let mut inputs = road.inputs(t, &x);
+        if (30..35).contains(&k) {
+            inputs.kappa_ref[0] = 1e300;
+        }
+        controller.advance(t, 0.033, &inputs).unwrap();
+        let o = controller.output();
+        assert!(
+            [o.delta, o.a_x, o.c_f, o.c_r, o.kkt_residual, o.slack_e_y].iter().all(|v| v.is_finite()),
+            "sample {k}"
+        );
+        let trajectories =
+            [&o.e_y_pred, &o.e_psi_pred, &o.v_x_pred, &o.v_y_pred, &o.yaw_rate_pred, &o.delta_pred, &o.a_x_pred];
+        assert!(trajectories.iter().all(|t| t.iter().all(|v| v.is_finite())), "sample {k}");
+    }
+    assert!(controller.output().status <= Status::InteriorPoint, "valid inputs recover");
+}
+
+#[test]
 fn good_inputs_recover_from_a_safe_stop() {
     let parameters = Parameters { horizon: 5, ..Parameters::default() };
     let road = Loop::new(parameters.clone(), straight);
