@@ -30,19 +30,6 @@ fn zero() -> Inputs {
     Inputs::default()
 }
 
-fn moved(inputs: &Inputs, direction: &Inputs, by: f64) -> Inputs {
-    Inputs {
-        v_x: inputs.v_x + by * direction.v_x,
-        v_y: inputs.v_y + by * direction.v_y,
-        yaw_rate: inputs.yaw_rate + by * direction.yaw_rate,
-        e_y: inputs.e_y + by * direction.e_y,
-        e_psi: inputs.e_psi + by * direction.e_psi,
-        kappa_ref: inputs.kappa_ref + direction.kappa_ref * by,
-        v_x_ref: inputs.v_x_ref + direction.v_x_ref * by,
-        hold_preview: inputs.hold_preview,
-    }
-}
-
 fn directions() -> Vec<(&'static str, Inputs)> {
     let mut rng = Pcg64Mcg::seed_from_u64(5);
     let mut draw = || rng.random_range(-1.0..1.0);
@@ -88,8 +75,8 @@ fn compare_from(mut controller: Controller) {
                 let exact = quantities(&after.along(&direction).unwrap());
                 // Central differences: third derivatives times 1e-10, and rounding of 1e-16 times a gain over 1e-5.
                 let eps = 1e-5;
-                let ahead = quantities(advanced(&controller, t, &moved(&at, &direction, eps)).output());
-                let behind = quantities(advanced(&controller, t, &moved(&at, &direction, -eps)).output());
+                let ahead = quantities(advanced(&controller, t, &at.moved(&direction, eps)).output());
+                let behind = quantities(advanced(&controller, t, &at.moved(&direction, -eps)).output());
                 for (i, exact) in exact.into_iter().enumerate() {
                     let difference = (ahead[i] - behind[i]) / (2.0 * eps);
                     let tolerance = 1e-5 * (1.0 + difference.abs());
