@@ -1,6 +1,7 @@
 //! The tools around the two FMUs: pack them, drive them, show what they do. Run as `cargo fmu COMMAND`.
 
 pub mod archive;
+pub mod baselines;
 pub mod bench;
 pub mod campaign;
 pub mod demo;

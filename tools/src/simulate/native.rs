@@ -2,22 +2,99 @@
 //! what the other showed at `t`. So it gives the same bits as the packed FMUs, in a fraction of the time.
 
 use anyhow::{Context, Result};
-use lpv_mpc::Controller;
+use lpv_mpc::{Controller, Status};
 use vehicle::Vehicle;
 
 use crate::recording::{Recording, Row};
 
+/// What can drive the vehicle: it sees what the plant measures and answers with commands, one communication step at a time.
+pub trait Driver {
+    /// One step from time `t` [s] over `h` [s], with what was seen at `t`. Its command is visible afterwards.
+    ///
+    /// # Errors
+    /// If the driver cannot go on.
+    fn advance(&mut self, t: f64, h: f64, seen: &lpv_mpc::Inputs) -> Result<()>;
+
+    /// What is visible now.
+    fn shown(&self) -> Shown;
+}
+
+/// The part of a driver's output that is recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// Front steering angle command [rad].
+    pub delta: f64,
+    /// Longitudinal acceleration command [m/s2].
+    pub a_x: f64,
+    /// Front cornering stiffness that the driver believes in [N/rad].
+    pub c_f: f64,
+    /// Rear cornering stiffness that the driver believes in [N/rad].
+    pub c_r: f64,
+    /// How good the command is.
+    pub status: Status,
+    /// Iterations of a solver.
+    pub iterations: u32,
+    /// Scaled residual of the conditions of optimality [1].
+    pub kkt_residual: f64,
+    /// Largest predicted excess over the soft bound on the lateral error [m].
+    pub slack_e_y: f64,
+}
+
+impl Driver for Controller {
+    fn advance(&mut self, t: f64, h: f64, seen: &lpv_mpc::Inputs) -> Result<()> {
+        Ok(Self::advance(self, t, h, seen)?)
+    }
+
+    fn shown(&self) -> Shown {
+        let o = self.output();
+        Shown {
+            delta: o.delta,
+            a_x: o.a_x,
+            c_f: o.c_f,
+            c_r: o.c_r,
+            status: o.status,
+            iterations: o.iterations,
+            kkt_residual: o.kkt_residual,
+            slack_e_y: o.slack_e_y,
+        }
+    }
+}
+
 /// Drives until `stop` [s], or until the road ends if `stop` is not given; `tick` is called after each step with the time [s].
 pub fn drive(
     plant: &mut Vehicle,
-    controller: &mut Controller,
+    driver: &mut impl Driver,
     step: f64,
     stop: Option<f64>,
+    tick: impl FnMut(f64),
+) -> Result<Recording> {
+    drive_through(plant, driver, step, stop, |_, _| {}, tick)
+}
+
+/// The same with something between the two: `alter` changes, at a time [s], what the driver is given.
+pub fn drive_through(
+    plant: &mut Vehicle,
+    driver: &mut impl Driver,
+    step: f64,
+    stop: Option<f64>,
+    mut alter: impl FnMut(f64, &mut lpv_mpc::Inputs),
+    tick: impl FnMut(f64),
+) -> Result<Recording> {
+    drive_in(plant, driver, step, stop, |t, seen, _| alter(t, seen), tick)
+}
+
+/// The same in a world of its own: `world` changes, at a time [s], what the driver is given and what acts on the plant.
+pub fn drive_in(
+    plant: &mut Vehicle,
+    driver: &mut impl Driver,
+    step: f64,
+    stop: Option<f64>,
+    mut world: impl FnMut(f64, &mut lpv_mpc::Inputs, &mut vehicle::Inputs),
     mut tick: impl FnMut(f64),
 ) -> Result<Recording> {
     // A vehicle that never arrives must not run for ever: twice the reference's time is far more than tracking needs.
     let end = stop.unwrap_or_else(|| 2.0 * plant.road().duration());
-    let mut recording = Recording { rows: vec![row(0.0, plant, controller)] };
+    let mut recording = Recording { rows: vec![row(0.0, plant, driver)] };
     let mut steps = 0_u64;
     loop {
         // Times are multiples, not sums: a master that adds up steps drifts by rounding.
@@ -25,14 +102,15 @@ pub fn drive(
         if t + 0.5 * step > end || (stop.is_none() && plant.outputs().finished) {
             return Ok(recording);
         }
-        let seen = seen(plant);
-        let command = controller.output();
-        let commands = vehicle::Inputs { delta: command.delta, a_x: command.a_x, ..vehicle::Inputs::default() };
-        plant.advance(step, &commands).with_context(|| format!("the plant stopped at {t:.3} s"))?;
-        controller.advance(t, step, &seen).with_context(|| format!("the controller stopped at {t:.3} s"))?;
+        let mut seen = seen(plant);
+        let command = driver.shown();
+        let mut acting = vehicle::Inputs { delta: command.delta, a_x: command.a_x, ..vehicle::Inputs::default() };
+        world(t, &mut seen, &mut acting);
+        plant.advance(step, &acting).with_context(|| format!("the plant stopped at {t:.3} s"))?;
+        driver.advance(t, step, &seen).with_context(|| format!("the controller stopped at {t:.3} s"))?;
         steps += 1;
         let t = steps as f64 * step;
-        recording.rows.push(row(t, plant, controller));
+        recording.rows.push(row(t, plant, driver));
         tick(t);
     }
 }
@@ -54,10 +132,10 @@ fn seen(plant: &Vehicle) -> lpv_mpc::Inputs {
 }
 
 /// One sample, in the order of the recording's columns.
-fn row(t: f64, plant: &Vehicle, controller: &Controller) -> Row {
+fn row(t: f64, plant: &Vehicle, driver: &impl Driver) -> Row {
     let o = plant.outputs();
     let ahead = plant.preview();
-    let c = controller.output();
+    let c = driver.shown();
     [
         t,
         o.x,
