@@ -87,31 +87,40 @@ const ESTIMATION: Enumeration = Enumeration {
     ],
 };
 
-/// First value reference behind the previews.
-const INPUTS: usize = 5 + 2 * PREVIEW;
+/// First value reference behind the inputs that lead the table.
+const LEADING: usize = 5 + 2 * PREVIEW;
+
+/// The place of an input by its value reference; `None` for what is no input.
+fn place(inputs: &mut Inputs, reference: u32) -> Option<&mut f64> {
+    Some(match reference as usize {
+        0 => &mut inputs.v_x,
+        1 => &mut inputs.v_y,
+        2 => &mut inputs.yaw_rate,
+        3 => &mut inputs.e_y,
+        4 => &mut inputs.e_psi,
+        k if k < 5 + PREVIEW => &mut inputs.kappa_ref[k - 5],
+        k if k < LEADING => &mut inputs.v_x_ref[k - 5 - PREVIEW],
+        k => {
+            let first = table().find("mu_ref[1]")? as usize;
+            inputs.mu_ref.get_mut(k.checked_sub(first)?)?
+        }
+    })
+}
 
 /// A direction in the space of the inputs, given as pairs of value reference and component.
 pub fn along(components: impl Iterator<Item = (u32, f64)>) -> Inputs {
     let mut direction = Inputs::default();
     for (reference, component) in components {
-        let place = match reference as usize {
-            0 => &mut direction.v_x,
-            1 => &mut direction.v_y,
-            2 => &mut direction.yaw_rate,
-            3 => &mut direction.e_y,
-            4 => &mut direction.e_psi,
-            k if k < 5 + PREVIEW => &mut direction.kappa_ref[k - 5],
-            k if k < INPUTS => &mut direction.v_x_ref[k - 5 - PREVIEW],
-            _ => continue,
-        };
-        *place += component;
+        if let Some(place) = place(&mut direction, reference) {
+            *place += component;
+        }
     }
     direction
 }
 
 /// Whether a value reference belongs to an input.
 pub fn is_input(reference: u32) -> bool {
-    (reference as usize) < INPUTS
+    place(&mut Inputs::default(), reference).is_some()
 }
 
 /// Name behind a value reference.
@@ -197,6 +206,9 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Parameter hold_preview "Whether only element 1 of each preview is given and holds for the others" => inputs.hold_preview;
         Parameter network_file "File of the network's weights, a path or file URI, relative to the resources; empty: the built-in network" => network_file;
         Output confidence ["1"] "How far the network is believed: 0 the nominal stiffnesses, 1 the network's", min 0.0, max 1.0 => { get |m| m.output.confidence };
+        Input mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times; 0: unknown, mu holds", terminal "preview", min 0.0, max 5.0 => inputs.mu_ref;
+        Tunable mu ["1"] "Friction of the road where mu_ref does not tell it", min 0.01, max 5.0 => parameters.mu;
+        Tunable grip_max ["1"] "Share of the grip that the planned speed may use; 0: the wanted speed is planned whatever it takes", min 0.0, max 2.0 => parameters.grip_max;
     }
 }
 
@@ -228,7 +240,7 @@ mod tests {
     fn directions_follow_the_table() {
         let inputs: Vec<u32> =
             table().variables().filter(|(.., row, _)| row.role == Role::Input).map(|(vr, ..)| vr).collect();
-        assert_eq!(inputs.len(), INPUTS);
+        assert_eq!(inputs.len(), 5 + 3 * PREVIEW);
         for seed in &inputs {
             let model = LpvMpcController { inputs: along([(*seed, 1.0)].into_iter()), ..LpvMpcController::default() };
             for reference in &inputs {
@@ -236,6 +248,7 @@ mod tests {
                 assert_eq!(real(&model, *reference), f64::from(u8::from(reference == seed)), "{}", name(*seed));
             }
         }
-        assert!(!is_input(u32::try_from(INPUTS).unwrap()));
+        let others = table().variables().filter(|(.., row, _)| row.role != Role::Input);
+        assert_eq!(others.filter(|(vr, ..)| is_input(*vr)).count(), 0);
     }
 }

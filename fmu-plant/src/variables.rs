@@ -155,6 +155,7 @@ pub fn table() -> &'static Table<VehiclePlant> {
         Output lap "Completed laps of a closed track", depends &[] => outputs.lap;
         Output slip_f ["1"] "Front slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &["delta"] => outputs.slip_f;
         Output slip_r ["1"] "Rear slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &[] => outputs.slip_r;
+        Output mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times", terminal "preview", depends &[] => preview.mu_ref;
     }
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
+use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
@@ -201,12 +202,13 @@ impl Controller {
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
         tyres.observe(&x, &delivered);
         self.snapshot.tyres[1] = *tyres.present();
-        let at = latency.predict(&x, h, |s| inputs.curvature(s / p.t_s), body, tyres.present(), &disturbance);
-        let reference = inputs.reference((h + p.input_delay) / p.t_s);
+        let road = inputs.road(p);
+        let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &disturbance);
         let u_prev = self.u_prev;
+        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &disturbance);
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
         let (status, command) = with_mpc!(core, mpc => {
-            let outcome = mpc.step(&at, &u_prev, &reference, &hold, body, tyres, &disturbance);
+            let outcome = mpc.step(&at, &u_prev, &guide, &hold, body, tyres, &disturbance);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
             if mpc.plan.is_left() && sighted {
                 (Status::of(outcome, complete), mpc.plan.u[0])
@@ -254,7 +256,7 @@ impl Controller {
             measured[V_Y] = f64::NAN;
         }
         let Beliefs { body, tyres } = &self.beliefs;
-        if self.estimator.update(&measured, inputs.curvature(0.0), delivered, duration, body, tyres.present()) {
+        if self.estimator.update(&measured, inputs.kappa_ref[0], delivered, duration, body, tyres.present()) {
             // Some importers show zeros until the first exchange of values: a plan for a car at rest serves no moving one.
             with_mpc!(&mut self.core, mpc => mpc.forget());
         }

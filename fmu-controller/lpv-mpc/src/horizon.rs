@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::Scalar;
 use crate::discretise::{Discrete, Hold, discretise};
+use crate::guide::Path;
 use crate::latency::Predicted;
 use crate::model::{
     A_X, Body, DELTA, Disturbance, E_PSI, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed,
@@ -24,15 +25,6 @@ pub struct Surroundings<'a, T> {
     pub hold: &'a Hold,
     /// Accelerations that the model cannot explain.
     pub disturbance: Disturbance<T>,
-}
-
-/// The path under one stage.
-#[derive(Clone, Copy)]
-pub struct Path<T> {
-    /// Curvature at the beginning and at the end of the stage [1/m].
-    pub kappa: [T; 2],
-    /// Wanted speed at the end of the stage [m/s].
-    pub v_x: T,
 }
 
 /// One stage of the quadratic programme, `x+ = A x + B u + d` with the reference of `x+`.

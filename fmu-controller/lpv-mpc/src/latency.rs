@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::model::{A_X, Body, DELTA, Disturbance, Input, NU, State, Tyres, V_X, derivative, fastest_rate};
+use crate::model::{A_X, Body, DELTA, Disturbance, Input, NU, State, Tyres, V_X, derivative, fastest_rate, progress};
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
 /// that mode, and far less of the slow ones that carry the car.
@@ -36,6 +36,8 @@ pub struct Latency {
 pub struct Predicted<T = f64> {
     /// Vehicle state.
     pub x: State<T>,
+    /// Way along the path since the measurement [m].
+    pub distance: T,
     /// Actual steering angle [rad] and acceleration [m/s2].
     pub actual: Input,
 }
@@ -103,19 +105,19 @@ impl Latency {
 
     /// Moves the state `x` at the time of the last [`advance`](Self::advance) on by `step` [s] and the delay.
     ///
-    /// `kappa` gives the curvature [1/m] at a time after the measurement [s].
+    /// `kappa` gives the curvature [1/m] at a distance from the place of the measurement [m].
     pub fn predict<T: Scalar>(
         &self,
         x: &State<T>,
         step: f64,
-        kappa: impl Fn(f64) -> T,
+        kappa: impl Fn(T) -> T,
         body: &Body,
         tyres: &Tyres<T>,
         disturbance: &Disturbance<T>,
     ) -> Predicted<T> {
         let end = self.time + step + self.delay;
         let rate = fastest_rate(x[V_X].re(), body, tyres);
-        let mut at = Predicted { x: *x, actual: self.actual };
+        let mut at = Predicted { x: *x, distance: T::zero(), actual: self.actual };
         let mut now = self.time;
         while now < end - SAME_TIME {
             let (command, until) = self.acting(now);
@@ -124,9 +126,9 @@ impl Latency {
             let h = piece / steps;
             let mut done = 0.0;
             while done < steps {
-                let t = now - self.time + done * h;
-                let f = |x: &State<T>, u: &Input, s: f64| {
-                    derivative(x, &u.map(T::from), kappa(t + s), body, tyres, disturbance)
+                let f = |x: &State<T>, u: &Input, distance: T| {
+                    let kappa = kappa(distance);
+                    (derivative(x, &u.map(T::from), kappa, body, tyres, disturbance), progress(x, kappa))
                 };
                 at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;
@@ -136,24 +138,29 @@ impl Latency {
         at
     }
 
-    /// One classic Runge-Kutta step of `x' = f(x, u, s)` behind the lags.
+    /// One classic Runge-Kutta step of state and distance, `(x', s') = f(x, u, s)`, behind the lags.
     fn runge_kutta<T: Scalar>(
         &self,
         at: &Predicted<T>,
         command: &Input,
         h: f64,
-        f: impl Fn(&State<T>, &Input, f64) -> State<T>,
+        f: impl Fn(&State<T>, &Input, T) -> (State<T>, T),
     ) -> Predicted<T> {
         let middle = lag(&at.actual, command, h / 2.0, &self.tau);
         let end = lag(&at.actual, command, h, &self.tau);
         // Without a lag the command acts from the first moment on.
         let start = lag(&at.actual, command, 0.0, &self.tau);
-        let half = T::from(h / 2.0);
-        let k1 = f(&at.x, &start, 0.0);
-        let k2 = f(&(at.x + k1 * half), &middle, h / 2.0);
-        let k3 = f(&(at.x + k2 * half), &middle, h / 2.0);
-        let k4 = f(&(at.x + k3 * T::from(h)), &end, h);
-        Predicted { x: at.x + (k1 + (k2 + k3) * T::from(2.0) + k4) * T::from(h / 6.0), actual: end }
+        let rate =
+            |slope: (State<T>, T), h: f64, u: &Input| f(&(at.x + slope.0 * T::from(h)), u, at.distance + slope.1 * h);
+        let k1 = f(&at.x, &start, at.distance);
+        let k2 = rate(k1, h / 2.0, &middle);
+        let k3 = rate(k2, h / 2.0, &middle);
+        let k4 = rate(k3, h, &end);
+        Predicted {
+            x: at.x + (k1.0 + (k2.0 + k3.0) * T::from(2.0) + k4.0) * T::from(h / 6.0),
+            distance: at.distance + (k1.1 + (k2.1 + k3.1) * 2.0 + k4.1) * (h / 6.0),
+            actual: end,
+        }
     }
 }
 

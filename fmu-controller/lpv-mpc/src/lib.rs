@@ -19,10 +19,12 @@
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
 
 pub mod adaptation;
+mod ahead;
 pub mod controller;
 pub mod discretise;
 mod error;
 pub mod estimator;
+mod guide;
 mod horizon;
 pub mod jordan;
 mod ladder;

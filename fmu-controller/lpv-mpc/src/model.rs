@@ -124,6 +124,12 @@ pub fn slip_angles<T: Scalar>(x: &State<T>, delta: T, body: &Body) -> (T, T) {
     (delta * ratio - ((x[V_Y] + x[YAW_RATE] * body.l_f) / v).atan(), -((x[V_Y] - x[YAW_RATE] * body.l_r) / v).atan())
 }
 
+/// Progress along the path [m/s], `s'` of [Kebbati, eq. (1)].
+pub fn progress<T: Scalar>(x: &State<T>, kappa: T) -> T {
+    let (s_psi, c_psi) = x[E_PSI].sin_cos();
+    (x[V_X] * c_psi - x[V_Y] * s_psi) / path_factor(kappa, x[E_Y])
+}
+
 /// Right-hand side of the prediction model, [Kebbati, eq. (1)] corrected.
 ///
 /// Differs from the printed equations in the signs of the slip angles, the factor `kappa` and the signs in `e_psi'`, and
@@ -136,7 +142,7 @@ pub fn derivative<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> State<T> {
-    let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
+    let [v_x, v_y, yaw_rate, _, e_psi] = (*x).into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
     let (_, ratio) = guarded(v_x);
     let (alpha_f, alpha_r) = slip_angles(x, u[DELTA], body);
@@ -150,7 +156,7 @@ pub fn derivative<T: Scalar>(
         (f_yf * c + f_yr) / m - yaw_rate * v_x + disturbance[1],
         (f_yf * c * l_f - f_yr * l_r) / i_z + disturbance[2],
         v_x * s_psi + v_y * c_psi,
-        yaw_rate - kappa * (v_x * c_psi - v_y * s_psi) / path_factor(kappa, e_y),
+        yaw_rate - kappa * progress(x, kappa),
     ])
 }
 

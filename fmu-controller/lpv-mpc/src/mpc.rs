@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::discretise::Hold;
-use crate::horizon::{NX_LAGS, Path, Surroundings, full_state, linearise, middle, steady_state};
+use crate::guide::Guide;
+use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
-use crate::parameters::{Backend, HORIZON_MAX};
+use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
+use crate::parameters::Backend;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
@@ -21,15 +22,6 @@ const FIRST_PASSES: usize = 3;
 
 /// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
 const CLARABEL_TOLERANCE: f64 = 1e-10;
-
-/// What the plan shall follow, at the moments at which its states are predicted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
-    /// Curvature of the path [1/m].
-    pub kappa: SVector<f64, { HORIZON_MAX + 1 }>,
-    /// Wanted speed [m/s].
-    pub v_x: SVector<f64, { HORIZON_MAX + 1 }>,
-}
 
 /// Where the axle forces of the prediction come from.
 pub trait TyreModel {
@@ -108,13 +100,6 @@ pub struct Mpc<const N_X: usize> {
     pub(crate) smooth: bool,
 }
 
-impl Reference {
-    /// The path under stage `i`.
-    pub fn stage(&self, i: usize) -> Path<f64> {
-        Path { kappa: [self.kappa[i], self.kappa[i + 1]], v_x: self.v_x[i + 1] }
-    }
-}
-
 impl<const N_X: usize> Mpc<N_X> {
     /// Room for the horizon of valid parameters.
     pub fn new(p: &Parameters) -> Self {
@@ -159,26 +144,26 @@ impl<const N_X: usize> Mpc<N_X> {
         &mut self,
         at: &Predicted,
         u_prev: &Input,
-        reference: &Reference,
+        guide: &Guide<'_, f64>,
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
         disturbance: &Disturbance,
     ) -> Outcome {
         let continues = self.plan.is_left();
+        self.problem.x_0 = full_state(at);
+        self.problem.u_prev = *u_prev;
         if continues {
             self.plan.shift();
             self.structured.shift();
         } else {
             self.structured.reset();
-            self.expect_steady_driving(reference, body, &tyres.nominal());
+            self.expect_steady_driving(guide.clone(), body, &tyres.nominal());
         }
-        self.problem.x_0 = full_state(at);
-        self.problem.u_prev = *u_prev;
         let passes = if continues { 1 } else { FIRST_PASSES };
         for _ in 0..passes {
             self.plan.x[0] = self.problem.x_0;
-            self.model(reference, hold, body, tyres, disturbance);
+            self.model(guide.clone(), hold, body, tyres, disturbance);
             if !self.solve() {
                 break;
             }
@@ -200,20 +185,21 @@ impl<const N_X: usize> Mpc<N_X> {
         (self.solution.iterations, self.solution.residual, self.solution.slack)
     }
 
-    /// A schedule for the first sample: steady cornering on the reference.
-    fn expect_steady_driving(&mut self, reference: &Reference, body: &Body, tyres: &Tyres) {
-        for (i, x) in self.plan.x.iter_mut().enumerate() {
-            *x = steady_state(reference.v_x[i], reference.kappa[i], body, tyres);
-        }
-        for (i, u) in self.plan.u.iter_mut().enumerate() {
-            *u = Input::from([(body.l_f + body.l_r) * reference.kappa[i], 0.0]);
+    /// A schedule for the first sample: steady cornering on the path, at the speed to be followed.
+    fn expect_steady_driving(&mut self, mut guide: Guide<'_, f64>, body: &Body, tyres: &Tyres) {
+        let mut pace = self.problem.x_0[V_X];
+        for (x, u) in self.plan.x[1..].iter_mut().zip(&mut self.plan.u) {
+            let path = guide.advance(|_| pace);
+            pace = path.v_x;
+            *x = steady_state(path.v_x, path.kappa[1], body, tyres);
+            *u = Input::from([(body.l_f + body.l_r) * path.kappa[0], 0.0]);
         }
     }
 
     /// Fills the stages of the quadratic programme along the schedule.
     fn model(
         &mut self,
-        reference: &Reference,
+        mut guide: Guide<'_, f64>,
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
@@ -226,7 +212,8 @@ impl<const N_X: usize> Mpc<N_X> {
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
             self.tyres[i] = tyres.at(&at.0, &at.1);
-            *stage = linearise(&at, &reference.stage(i), &self.tyres[i], &around).into();
+            let path = guide.advance(|kappa| progress(&at.0, kappa));
+            *stage = linearise(&at, &path, &self.tyres[i], &around).into();
         }
     }
 

@@ -74,6 +74,10 @@ pub struct Parameters {
     pub c_f_nominal: f64,
     /// Nominal rear cornering stiffness of the axle [N/rad].
     pub c_r_nominal: f64,
+    /// Friction of the road where the preview does not tell it [1].
+    pub mu: f64,
+    /// Share of the grip that the planned speed may use; 0: any speed that is wanted [1].
+    pub grip_max: f64,
     /// Controller period [s].
     pub t_s: f64,
     /// Prediction horizon in periods [1].
@@ -137,6 +141,7 @@ impl Default for Parameters {
             q_v_x: 5.0,
             r_delta: 300.0,
             r_a_x: 0.1,
+            grip_max: 0.95,
             estimation: Estimation::Kalman,
             ..Self::paper()
         }
@@ -162,6 +167,8 @@ impl Parameters {
             area: 1.6,
             rho: 1.225,
             g: 9.81,
+            mu: 0.82,
+            grip_max: 0.0,
             t_s: 0.033,
             horizon: 10,
             e_y_max: 0.3,
@@ -233,6 +240,7 @@ impl Parameters {
             ("l_f", self.l_f),
             ("l_r", self.l_r),
             ("g", self.g),
+            ("mu", self.mu),
             ("c_f_nominal", self.c_f_nominal),
             ("c_r_nominal", self.c_r_nominal),
             ("r_delta", self.r_delta),
@@ -263,6 +271,7 @@ impl Parameters {
         ] {
             check(name, value, not_negative(value), "zero or positive, and finite")?;
         }
+        check("grip_max", self.grip_max, (0.0..=2.0).contains(&self.grip_max), "between 0 and 2")?;
         check("t_s", self.t_s, (1e-3..=0.2).contains(&self.t_s), "between 0.001 and 0.2 s")?;
         check("input_delay", self.input_delay, (0.0..=LATENCY_MAX).contains(&self.input_delay), "between 0 and 1 s")?;
         check("a_x_min", self.a_x_min, self.a_x_min < 0.0 && self.a_x_min.is_finite(), "negative and finite")?;
@@ -324,7 +333,7 @@ mod tests {
                 match name { $(stringify!($field) => { p.$field = f64::NAN; true })* _ => false }
             };
         }
-        let is_real = reals!(m i_z l_f l_r c_d area rho c_rr g c_f_nominal c_r_nominal t_s q_v_x q_v_y q_yaw_rate q_e_y
+        let is_real = reals!(m i_z l_f l_r c_d area rho c_rr g mu grip_max c_f_nominal c_r_nominal t_s q_v_x q_v_y q_yaw_rate q_e_y
             q_e_psi r_delta r_a_x terminal_factor delta_max delta_rate_max a_x_min a_x_max a_x_rate_max e_y_max
             e_y_penalty input_delay tau_delta tau_a_x sensor_noise);
         assert!(

@@ -12,10 +12,11 @@ use serde::{Deserialize, Serialize};
 use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
-use crate::horizon::{Path, Surroundings, full_state, linearise, middle, vehicle_part};
+use crate::guide::Guide;
+use crate::horizon::{Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y, progress};
 use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::{Estimation, HORIZON_MAX};
 use crate::qp::{Perturbation, Stage};
@@ -91,19 +92,17 @@ pub(crate) fn along<const N_X: usize>(
     if !mpc.smooth {
         return None;
     }
-    // A preview that is held follows its first element.
-    let direction = Inputs { hold_preview: snapshot.inputs.hold_preview, ..direction.clone() };
     let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-    let (x, disturbance) = snapshot.estimate(&direction, p, body);
+    let (x, disturbance) = snapshot.estimate(direction, p, body);
     let mut neighbours = adapter.neighbours(snapshot.memory, &x, &snapshot.delivered);
     let present = match &neighbours {
         Some(neighbours) => neighbours.present(&snapshot.tyres[1]),
         None => fixed(&snapshot.tyres[1]),
     };
-    let kappa = |s: f64| dual(snapshot.inputs.curvature(s / p.t_s), direction.curvature(s / p.t_s));
-    let at = latency.predict(&x, snapshot.step, kappa, body, &present, &disturbance);
-    let periods = (snapshot.step + p.input_delay) / p.t_s;
-    let (reference, slope) = (snapshot.inputs.reference(periods), direction.reference(periods));
+    let road = snapshot.inputs.road_along(direction, p);
+    let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &disturbance);
+    let since = snapshot.step + p.input_delay;
+    let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, &hold), &disturbance);
     let around = Surroundings { body, nominal: adapter.nominal(), hold: &hold, disturbance };
 
     let mut change = Perturbation::new(mpc.plan.u.len());
@@ -112,11 +111,7 @@ pub(crate) fn along<const N_X: usize>(
     for (i, stage) in change.stages.iter_mut().enumerate() {
         let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
         let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
-        let (path, path_slope) = (reference.stage(i), slope.stage(i));
-        let path = Path {
-            kappa: [0, 1].map(|j| dual(path.kappa[j], path_slope.kappa[j])),
-            v_x: dual(path.v_x, path_slope.v_x),
-        };
+        let path = guide.advance(|kappa| progress(&scheduled.0, kappa));
         let tyres = match &mut neighbours {
             Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.0, &scheduled.1),
             None => fixed(&mpc.tyres[i]),

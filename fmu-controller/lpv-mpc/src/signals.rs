@@ -1,13 +1,14 @@
 //! What the controller is given and what it answers, named as in the public interface.
 
 use nalgebra::SVector;
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
+use crate::ahead::Road;
 use crate::ladder::Status;
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE};
-use crate::mpc::Reference;
-use crate::parameters::HORIZON_MAX;
-use crate::preview::{self, Preview};
+use crate::parameters::{HORIZON_MAX, Parameters};
+use crate::preview::Preview;
 
 /// A predicted quantity over the horizon; beyond it the last value is repeated.
 pub type Trajectory = SVector<f64, HORIZON_MAX>;
@@ -29,6 +30,9 @@ pub struct Inputs {
     pub kappa_ref: Preview,
     /// Wanted speed now and at the next 40 sample times [m/s].
     pub v_x_ref: Preview,
+    /// Friction of the road now and where the reference will be at the next 40 sample times; 0 where it is not known, then the
+    /// parameter `mu` holds [1].
+    pub mu_ref: Preview,
     /// Whether only the first element of each preview is given and holds for the others.
     pub hold_preview: bool,
 }
@@ -43,6 +47,7 @@ impl Default for Inputs {
             e_psi: 0.0,
             kappa_ref: Preview::zeros(),
             v_x_ref: Preview::zeros(),
+            mu_ref: Preview::zeros(),
             hold_preview: false,
         }
     }
@@ -60,6 +65,7 @@ impl Inputs {
             e_psi: self.e_psi + duration * rates.e_psi,
             kappa_ref: self.kappa_ref + rates.kappa_ref * duration,
             v_x_ref: self.v_x_ref + rates.v_x_ref * duration,
+            mu_ref: self.mu_ref + rates.mu_ref * duration,
             hold_preview: self.hold_preview,
         }
     }
@@ -75,17 +81,26 @@ impl Inputs {
         x
     }
 
-    /// Curvature `periods` after now [1/m].
-    pub(crate) fn curvature(&self, periods: f64) -> f64 {
-        if self.hold_preview { self.kappa_ref[0] } else { preview::at(&self.kappa_ref, periods) }
+    /// The previewed road.
+    pub(crate) fn road(&self, p: &Parameters) -> Road {
+        Road::new(|i| self.element(i), p)
     }
 
-    /// The reference from `latency` periods after now on.
-    pub(crate) fn reference(&self, latency: f64) -> Reference {
-        let from = |preview: &Preview| {
-            if self.hold_preview { Preview::repeat(preview[0]) } else { preview::from(preview, latency) }
+    /// The previewed road with its derivative along a `direction` of the inputs.
+    pub(crate) fn road_along(&self, direction: &Self, p: &Parameters) -> Road<Dual64> {
+        // A preview that is held follows its first element.
+        let direction = Self { hold_preview: self.hold_preview, ..direction.clone() };
+        let element = |i: usize| {
+            let (value, slope) = (self.element(i), direction.element(i));
+            std::array::from_fn(|k| Dual64::new(value[k], slope[k]))
         };
-        Reference { kappa: from(&self.kappa_ref), v_x: from(&self.v_x_ref) }
+        Road::new(element, p)
+    }
+
+    /// Element `i` of the preview: curvature [1/m], wanted speed [m/s] and friction [1].
+    fn element(&self, i: usize) -> [f64; 3] {
+        let i = if self.hold_preview { 0 } else { i };
+        [self.kappa_ref[i], self.v_x_ref[i], self.mu_ref[i]]
     }
 }
 

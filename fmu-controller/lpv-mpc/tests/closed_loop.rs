@@ -40,7 +40,7 @@ impl Loop {
             e_psi: x[E_PSI],
             kappa_ref: Preview::from_fn(|i, _| (self.kappa)(t + i as f64 * t_s)),
             v_x_ref: Preview::repeat(self.speed),
-            hold_preview: false,
+            ..Inputs::default()
         }
     }
 

@@ -22,7 +22,7 @@ fn inputs(t: f64) -> Inputs {
         e_psi: 0.01 * (0.7 * t).sin(),
         kappa_ref: Preview::from_fn(|i, _| 0.006 * (1.5 * (t + i as f64 * 0.033)).sin()),
         v_x_ref: Preview::from_fn(|i, _| 14.0 + 0.2 * (t + i as f64 * 0.033).cos()),
-        hold_preview: false,
+        ..Inputs::default()
     }
 }
 

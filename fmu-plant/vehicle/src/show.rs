@@ -23,10 +23,13 @@ impl Vehicle {
         }
     }
 
-    /// Curvature and speed of the path ahead.
+    /// Curvature, speed and friction of the path ahead. The factor on the friction that the last step ended with counts
+    /// everywhere: whoever looks ahead sees the weather.
     #[must_use]
     pub fn preview(&self) -> Preview {
-        self.road.preview(self.state.x[S], self.parameters.preview_step)
+        let Self { road, state: State { x, inputs, .. }, derived, .. } = self;
+        let friction = |s| derived.dynamics.friction(road, s) * inputs.mu_scale;
+        road.preview(x[S], self.parameters.preview_step, friction)
     }
 
     /// Time derivative of the preview.
@@ -34,7 +37,8 @@ impl Vehicle {
     pub fn preview_rate(&self) -> Preview {
         let [v_x, v_y, _, s, e_y, e_psi, ..] = self.state.x;
         let s_dot = dynamics::progress_rate((v_x, v_y), (e_y, e_psi), self.road.curvature(s));
-        self.road.preview_rate(s, s_dot, self.parameters.preview_step)
+        let friction = |s| self.derived.dynamics.friction(&self.road, s) * self.state.inputs.mu_scale;
+        self.road.preview_rate(s, s_dot, self.parameters.preview_step, friction)
     }
 
     /// Everything else that the plant shows, under the inputs of the last step.

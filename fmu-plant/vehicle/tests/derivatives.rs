@@ -114,7 +114,9 @@ fn extrapolated_inputs_equal_many_small_steps() {
 
 #[test]
 fn preview_rate_matches_the_motion() {
-    let mut vehicle = vehicle("general", Parameters { e_y_0: 0.3, ..Parameters::default() });
+    // Half-way through the edges of a patch, whose friction then changes along the preview.
+    let patch = Parameters { patch_start: 75.0, patch_length: 5.0, patch_edge: 20.0, ..Parameters::default() };
+    let mut vehicle = vehicle("general", Parameters { e_y_0: 0.3, ..patch });
     drive(&mut vehicle, 150, 1, |_| ()).unwrap();
     let inputs = driver::command(&vehicle);
     let h = 1e-4;
@@ -129,5 +131,8 @@ fn preview_rate_matches_the_motion() {
         assert!((got.kappa_ref[j] - want).abs() < 1e-6, "kappa_ref[{j}]: {} for {want}", got.kappa_ref[j]);
         let want = (high.v_x_ref[j] - low.v_x_ref[j]) / (2.0 * h);
         assert!((got.v_x_ref[j] - want).abs() < 1e-4, "v_x_ref[{j}]: {} for {want}", got.v_x_ref[j]);
+        let want = (high.mu_ref[j] - low.mu_ref[j]) / (2.0 * h);
+        assert!((got.mu_ref[j] - want).abs() < 1e-4, "mu_ref[{j}]: {} for {want}", got.mu_ref[j]);
     }
+    assert!(got.mu_ref.iter().any(|rate| rate.abs() > 0.01), "no friction that changes");
 }

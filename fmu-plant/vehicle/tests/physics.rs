@@ -314,6 +314,7 @@ fn laps_are_counted() {
     assert!((ratio - 2.0).abs() < 0.01, "second lap took {ratio} of the first");
     // The previews of two laps are the same.
     let length = vehicle.road().length();
-    let (one, two) = (vehicle.road().preview(length - 5.0, T_S), vehicle.road().preview(2.0 * length - 5.0, T_S));
+    let (one, two) =
+        (vehicle.road().preview(length - 5.0, T_S, |_| 1.0), vehicle.road().preview(2.0 * length - 5.0, T_S, |_| 1.0));
     assert!((one.kappa_ref - two.kappa_ref).amax() < 1e-9 && (one.v_x_ref - two.v_x_ref).amax() < 1e-9);
 }

@@ -160,6 +160,6 @@ fn a_road_without_speed_is_driven_and_previewed() {
     }
     let standing = Road::from_csv("s,kappa,v_x\n0,0.01,0\n90000,0.01,0\n").unwrap();
     // The reference creeps through it: the preview is what lies here.
-    let preview = standing.preview(50.0, 0.033);
+    let preview = standing.preview(50.0, 0.033, |_| 1.0);
     assert!(preview.v_x_ref.iter().all(|v| *v == 0.0) && preview.kappa_ref.iter().all(|k| (k - 0.01).abs() < 1e-12));
 }

@@ -68,11 +68,11 @@ impl Grip {
             let transfer = a_x * self.lever;
             (positive(g_z * self.front - transfer) * mass, positive(g_z * self.rear + transfer) * mass)
         };
-        let mu = mu_scale * self.mu;
         let (mu_f, mu_r) = if self.patch.is_none() && !road.has_friction() {
+            let mu = mu_scale * self.mu;
             (mu, mu)
         } else {
-            (mu * self.friction(road, s + self.l_f), mu * self.friction(road, s - self.l_r))
+            (mu_scale * self.friction(road, s + self.l_f), mu_scale * self.friction(road, s - self.l_r))
         };
         let mut front = AxleGrip { mu: mu_f, load: load_f, left: D::one() };
         let mut rear = AxleGrip { mu: mu_r, load: load_r, left: D::one() };
@@ -83,8 +83,9 @@ impl Grip {
         (front, rear, (used_f + used_r) * (1.0 / mass))
     }
 
-    fn friction<D: Scalar>(&self, road: &Road, s: D) -> D {
-        let road = road.friction(s);
+    /// Friction at arc length `s`, of the road and the patch on it [1].
+    pub fn friction<D: Scalar>(&self, road: &Road, s: D) -> D {
+        let road = road.friction(s) * self.mu;
         match self.patch {
             None => road,
             Some([begin, end, edge, mu]) => road * (smooth::window(s, begin, end, edge) * (mu - 1.0) + 1.0),

@@ -161,6 +161,11 @@ impl Dynamics {
         }
     }
 
+    /// Friction of the road at arc length `s`, before the inputs' factor on it [1].
+    pub fn friction<D: Scalar>(&self, road: &crate::Road, s: D) -> D {
+        self.grip.friction(road, s)
+    }
+
     /// Rate of the fastest mode [1/s]: the tyres at the lowest guarded speed, and the relaxation at the highest speed.
     #[must_use]
     pub fn fastest_rate(&self, parameters: &Parameters) -> f64 {

@@ -1,0 +1,131 @@
+//! The road ahead of the car, by distance.
+//!
+//! The importer previews curvature, wanted speed and friction at the places that the reference reaches now and at the next 40
+//! sample times. A car that drives slower than the reference, because grip or its drive do not allow more, reaches those
+//! places later. So the preview is laid out over the distance that the reference covers, and the plan looks up curvature and
+//! friction where it will be itself. The wanted speed stays a function of time: a reference that stands would never leave.
+
+use crate::Scalar;
+use crate::parameters::Parameters;
+use crate::preview::PREVIEW;
+
+/// The reference covers ground at least this fast [m/s]: a road on which it stands still has places nevertheless.
+const PACE_MIN: f64 = 0.1;
+
+/// Curvature below which no speed of a road vehicle meets the limit of grip [1/m]: 500 m/s at 1 g is 4e-5.
+const STRAIGHT: f64 = 1e-5;
+
+/// Speed that stands for no limit [m/s].
+const NO_LIMIT: f64 = 1e3;
+
+/// One quantity at the places of the preview.
+type Row<T> = [T; PREVIEW];
+
+/// The previewed road, laid out over distance.
+#[derive(Clone, Copy, Debug)]
+pub struct Road<T = f64> {
+    /// Distance from the place of the measurement [m].
+    s: Row<T>,
+    /// Curvature [1/m].
+    kappa: Row<T>,
+    /// Wanted speed [m/s].
+    v_x: Row<T>,
+    /// Speed that grip permits, with the braking that it takes to keep it [m/s].
+    limit: Row<T>,
+    /// Time between elements of the preview [s].
+    period: f64,
+}
+
+/// Where a distance lies between the places of the preview.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<T> {
+    before: usize,
+    fraction: T,
+}
+
+impl<T: Scalar> Road<T> {
+    /// Lays a preview out: element `i` has curvature [1/m], wanted speed [m/s] and friction, 0 where that is unknown [1].
+    pub fn new(element: impl Fn(usize) -> [T; 3], p: &Parameters) -> Self {
+        let rows: [[T; 3]; PREVIEW] = std::array::from_fn(element);
+        let row = |k: usize| std::array::from_fn(|i| rows[i][k]);
+        let (kappa, v_x): (Row<T>, Row<T>) = (row(0), row(1));
+        let mut s = [T::zero(); PREVIEW];
+        for i in 1..PREVIEW {
+            s[i] = s[i - 1] + ((v_x[i - 1] + v_x[i]) * 0.5).larger(PACE_MIN) * p.t_s;
+        }
+        let friction = |i: usize| if rows[i][2].re() > 0.0 { rows[i][2] } else { T::from(p.mu) };
+        let limit = permitted(&s, &kappa, friction, p);
+        Self { s, kappa, v_x, limit, period: p.t_s }
+    }
+
+    /// Finds a distance [m], looking from the place found `last` on: a plan goes forward.
+    pub fn find(&self, s: T, last: usize) -> Place<T> {
+        let mut before = last;
+        // A distance that is no number lies nowhere, and what is found there is no number either.
+        while before < PREVIEW - 2 && self.s[before + 1].re() <= s.re() {
+            before += 1;
+        }
+        let fraction = (s - self.s[before]) / (self.s[before + 1] - self.s[before]);
+        let fraction = if fraction.re() > 1.0 { T::one() } else { fraction.larger(0.0) };
+        Place { before, fraction }
+    }
+
+    /// Curvature at a distance [1/m].
+    pub fn curvature(&self, s: T) -> T {
+        self.find(s, 0).of(&self.kappa)
+    }
+
+    /// Wanted speed after `time` [s] on the reference [m/s].
+    pub fn wanted(&self, time: f64) -> T {
+        let position = (time / self.period).clamp(0.0, (PREVIEW - 1) as f64);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the preview above")]
+        let before = (position as usize).min(PREVIEW - 2);
+        Place { before, fraction: T::from(position - before as f64) }.of(&self.v_x)
+    }
+
+    /// Curvature at a place [1/m] and the speed that grip permits there [m/s].
+    pub fn at(&self, place: &Place<T>) -> (T, T) {
+        (place.of(&self.kappa), place.of(&self.limit))
+    }
+}
+
+impl<T: Scalar> Place<T> {
+    /// Index of the element before the place.
+    pub fn before(&self) -> usize {
+        self.before
+    }
+
+    fn of(&self, row: &Row<T>) -> T {
+        row[self.before] + self.fraction * (row[self.before + 1] - row[self.before])
+    }
+}
+
+/// Largest speed at each place that stays within the share of the grip that may be planned with [m/s].
+///
+/// In a curve the lateral acceleration takes it, before a curve the braking; where both are needed they share the circle of
+/// friction. Passed from the end of the preview to its beginning, as for the speed profile of a racing line.
+fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, friction: impl Fn(usize) -> T, p: &Parameters) -> Row<T> {
+    let mut limit = [T::from(NO_LIMIT); PREVIEW];
+    if p.grip_max == 0.0 {
+        return limit;
+    }
+    for i in (0..PREVIEW).rev() {
+        let grip = friction(i) * (p.grip_max * p.g);
+        let curvature = if kappa[i].re() < 0.0 { -kappa[i] } else { kappa[i] };
+        if curvature.re() > STRAIGHT {
+            limit[i] = (grip / curvature).sqrt();
+        }
+        if i + 1 == PREVIEW {
+            continue;
+        }
+        let lateral = limit[i + 1] * limit[i + 1] * kappa[i + 1];
+        let left = grip * grip - lateral * lateral;
+        let braking = if left.re() > 0.0 { left.sqrt() } else { T::zero() };
+        let braking = if braking.re() > -p.a_x_min { T::from(-p.a_x_min) } else { braking };
+        let before = (limit[i + 1] * limit[i + 1] + (s[i + 1] - s[i]) * braking * 2.0).sqrt();
+        if before.re() < limit[i].re() {
+            limit[i] = before;
+        }
+    }
+    limit
+}

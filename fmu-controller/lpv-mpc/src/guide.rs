@@ -1,0 +1,130 @@
+//! What the plan shall follow: the path under each of its stages, and a speed that the car can drive there.
+//!
+//! The wanted speed is lowered to what grip permits ([`crate::ahead`]), and to what drive and brakes reach from the present
+//! speed. A speed that cannot be reached would be an error that the quadratic programme reduces by other means: through the
+//! tyres' resistance it would steer.
+
+use crate::Scalar;
+use crate::ahead::Road;
+use crate::discretise::Hold;
+use crate::latency::Predicted;
+use crate::model::{A_X, Body, Disturbance, Input, V_GUARD, V_X};
+use crate::parameters::Parameters;
+
+/// The path under one stage.
+#[derive(Clone, Copy)]
+pub struct Path<T> {
+    /// Curvature at the beginning and at the end of the stage [1/m].
+    pub kappa: [T; 2],
+    /// Speed to be followed at the end of the stage [m/s].
+    pub v_x: T,
+}
+
+/// Goes along the road with the plan, one stage after the other.
+#[derive(Clone)]
+pub struct Guide<'a, T> {
+    road: &'a Road<T>,
+    /// Distance of the stage's beginning [m], and the preview's element before it.
+    s: T,
+    before: usize,
+    /// Curvature there [1/m].
+    kappa: T,
+    /// Time on the reference [s].
+    time: f64,
+    /// The fastest and the slowest that the car can be.
+    reach: [Reach<T>; 2],
+    period: f64,
+}
+
+/// Speed under full use of drive or brakes.
+#[derive(Clone, Copy)]
+struct Reach<T> {
+    /// Speed [m/s].
+    v_x: T,
+    /// Command and what the actuator delivers [m/s2].
+    command: f64,
+    actual: f64,
+    /// Bound of the command [m/s2] and its change per period towards it [m/s2].
+    bound: f64,
+    step: f64,
+    /// What is left of the actuator's distance to its command after a period [1].
+    decay: f64,
+    /// Acceleration without drive and brakes but for the air [m/s2], and drag over mass [1/m].
+    free: T,
+    drag: f64,
+}
+
+impl<T: Scalar> Reach<T> {
+    fn advance(&mut self, period: f64) {
+        let to_bound = self.bound - self.command;
+        self.command += to_bound.clamp(-self.step, self.step);
+        let next = self.command + (self.actual - self.command) * self.decay;
+        // A first-order lag passes its mean a little later than half-way; the difference is a fraction of a period's.
+        let mean = if self.decay > 0.0 { 0.5 * (self.actual + next) } else { self.command };
+        self.actual = next;
+        let slowed = self.free - self.v_x * self.v_x * self.drag;
+        self.v_x = (self.v_x + (slowed + mean) * period).larger(0.0);
+    }
+}
+
+impl<'a, T: Scalar> Guide<'a, T> {
+    /// At the beginning of a plan from `at`, which is `latency` [s] after the measurement, with the command `u_prev`.
+    pub fn new(
+        road: &'a Road<T>,
+        at: &Predicted<T>,
+        u_prev: &Input,
+        latency: f64,
+        (p, body, hold): (&Parameters, &Body, &Hold),
+        disturbance: &Disturbance<T>,
+    ) -> Self {
+        let ratio = (at.x[V_X].re() / V_GUARD).min(1.0);
+        let reach = [p.a_x_max, p.a_x_min].map(|bound| Reach {
+            v_x: at.x[V_X],
+            command: u_prev[A_X],
+            actual: at.actual[A_X],
+            bound,
+            step: p.a_x_rate_max * p.t_s,
+            decay: hold.decay[A_X],
+            free: disturbance[0] - ratio * body.rolling,
+            drag: body.drag / body.m,
+        });
+        let place = road.find(at.distance, 0);
+        Self {
+            road,
+            s: at.distance,
+            before: place.before(),
+            kappa: road.at(&place).0,
+            time: latency,
+            reach,
+            period: p.t_s,
+        }
+    }
+
+    /// The path under the next stage, on which the car makes way at `pace` [m/s].
+    pub fn advance(&mut self, pace: impl FnOnce(T) -> T) -> Path<T> {
+        self.s += pace(self.kappa) * self.period;
+        self.time += self.period;
+        let place = self.road.find(self.s, self.before);
+        self.before = place.before();
+        let (kappa, limit) = self.road.at(&place);
+        for reach in &mut self.reach {
+            reach.advance(self.period);
+        }
+        let wanted = self.road.wanted(self.time);
+        let permitted = if limit.re() < wanted.re() { limit } else { wanted };
+        let [fastest, slowest] = &self.reach;
+        let v_x = if !wanted.re().is_finite() {
+            // No speed to drive at; the solver refuses it.
+            wanted
+        } else if fastest.v_x.re() < permitted.re() {
+            fastest.v_x
+        } else if slowest.v_x.re() > permitted.re() {
+            slowest.v_x
+        } else {
+            permitted
+        };
+        let path = Path { kappa: [self.kappa, kappa], v_x };
+        self.kappa = kappa;
+        path
+    }
+}
