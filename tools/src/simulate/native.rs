@@ -127,6 +127,7 @@ fn seen(plant: &Vehicle) -> lpv_mpc::Inputs {
         e_psi: measured.e_psi,
         kappa_ref: ahead.kappa_ref,
         v_x_ref: ahead.v_x_ref,
+        mu_ref: ahead.mu_ref,
         hold_preview: false,
     }
 }
