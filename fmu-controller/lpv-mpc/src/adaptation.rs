@@ -83,17 +83,29 @@ impl Adapter {
         }
     }
 
-    /// Takes in one sample: the state and what the actuators deliver.
-    pub fn observe(&mut self, x: &State, u: &Input) {
+    /// Takes in one sample: the state, what the actuators deliver, and the friction of the road [1].
+    pub fn observe(&mut self, x: &State, u: &Input, mu: f64) {
         let Some((memory, belief)) = self.ask(&self.memory, x, u) else {
             self.present = self.nominal;
             self.believed = (self.nominal.c_f, self.nominal.c_r, 0.0);
             return;
         };
         self.memory = memory;
-        self.present = belief.tangent(&self.nominal, TANGENT_FLOOR);
-        let secant = belief.secant(&self.nominal);
+        let share = self.share(mu);
+        self.present = scaled(&belief.tangent(&self.nominal, TANGENT_FLOOR), share);
+        let secant = scaled(&belief.secant(&self.nominal), share);
         self.believed = (secant.c_f, secant.c_r, belief.confidence);
+    }
+
+    /// What a friction [1] makes of the forces that the network knows.
+    ///
+    /// At the same slip a tyre's force is proportional to the friction, as in the magic formula with `D = mu F_z`. Inside the
+    /// range of its training the network is taken to know.
+    fn share(&self, mu: f64) -> f64 {
+        self.network.as_ref().map_or(1.0, |network| {
+            let [lowest, highest] = network.document().provenance.mu;
+            mu / mu.clamp(lowest, highest)
+        })
     }
 
     /// Axle forces around the last measurement.
@@ -106,17 +118,19 @@ impl Adapter {
         self.memory
     }
 
-    /// The tyres around a sample that began with the network's answer `before`, as its state moves along `x.eps`.
-    pub(crate) fn neighbours(&self, before: Memory, x: &State<Dual64>, u: &Input) -> Option<Neighbours> {
+    /// The tyres around a sample that began with the network's answer `before`, as its state moves along `x.eps` and the
+    /// friction along `mu.eps`.
+    pub(crate) fn neighbours(&self, before: Memory, x: &State<Dual64>, u: &Input, mu: Dual64) -> Option<Neighbours> {
         if self.mode == Adaptation::Constant {
             return None;
         }
-        let largest = x.iter().fold(SMALLEST_MOVE, |largest: f64, x| largest.max(x.eps.abs()));
+        let moves = x.iter().chain([&mu]);
+        let largest = moves.fold(SMALLEST_MOVE, |largest: f64, moved| largest.max(moved.eps.abs()));
         let distance = DISTANCE / largest;
         let sides = [distance, -distance].map(|distance| {
             let mut side = self.clone();
             side.memory = before;
-            side.observe(&x.map(|x| x.re + distance * x.eps), u);
+            side.observe(&x.map(|x| x.re + distance * x.eps), u, mu.re + distance * mu.eps);
             side.restart();
             side
         });
@@ -145,6 +159,11 @@ impl Adapter {
     }
 }
 
+/// All forces of these tyres times a factor.
+fn scaled(tyres: &Tyres, factor: f64) -> Tyres {
+    Tyres { c_f: tyres.c_f * factor, c_r: tyres.c_r * factor, f_f0: tyres.f_f0 * factor, f_r0: tyres.f_r0 * factor }
+}
+
 /// The same tyres a small distance ahead and behind along a direction: their derivative is a central difference.
 ///
 /// The tangents already hold the network's first derivatives, so exact ones would need its second derivatives along every
@@ -167,12 +186,12 @@ impl Neighbours {
         self.slope(value, &self.sides[0].present, &self.sides[1].present)
     }
 
-    /// The tyres of the next stage, which is at `x` and `u`.
-    pub fn at(&mut self, value: &Tyres, x: &State<Dual64>, u: &Input<Dual64>) -> Tyres<Dual64> {
+    /// The tyres of the next stage, which is at `x` and `u` on a road of friction `mu` [1].
+    pub fn at(&mut self, value: &Tyres, x: &State<Dual64>, u: &Input<Dual64>, mu: Dual64) -> Tyres<Dual64> {
         let distance = self.distance;
         let mut side = |i: usize, distance: f64| {
             let moved = |q: Dual64| q.re + distance * q.eps;
-            self.sides[i].at(&x.map(moved), &u.map(moved))
+            self.sides[i].at(&x.map(moved), &u.map(moved), moved(mu))
         };
         let (ahead, behind) = (side(0, distance), side(1, -distance));
         self.slope(value, &ahead, &behind)
@@ -198,14 +217,14 @@ impl TyreModel for Adapter {
         self.rolled = self.memory;
     }
 
-    fn at(&mut self, x: &State, u: &Input) -> Tyres {
+    fn at(&mut self, x: &State, u: &Input, mu: f64) -> Tyres {
         match self.mode {
             Adaptation::Constant => self.nominal,
             Adaptation::NetworkNow => self.present,
             Adaptation::NetworkHorizon => {
                 let Some((memory, belief)) = self.ask(&self.rolled, x, u) else { return self.nominal };
                 self.rolled = memory;
-                belief.tangent(&self.nominal, TANGENT_FLOOR)
+                scaled(&belief.tangent(&self.nominal, TANGENT_FLOOR), self.share(mu))
             }
         }
     }

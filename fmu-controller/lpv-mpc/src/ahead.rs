@@ -15,6 +15,9 @@ const PACE_MIN: f64 = 0.1;
 /// Curvature below which no speed of a road vehicle meets the limit of grip [1/m]: 500 m/s at 1 g is 4e-5.
 const STRAIGHT: f64 = 1e-5;
 
+/// No road is more slippery than this [1]: wet ice has 0.05.
+const FRICTION_MIN: f64 = 0.05;
+
 /// Speed that stands for no limit [m/s].
 const NO_LIMIT: f64 = 1e3;
 
@@ -30,6 +33,8 @@ pub struct Road<T = f64> {
     kappa: Row<T>,
     /// Wanted speed [m/s].
     v_x: Row<T>,
+    /// Friction [1].
+    mu: Row<T>,
     /// Speed that grip permits, with the braking that it takes to keep it [m/s].
     limit: Row<T>,
     /// Time between elements of the preview [s].
@@ -53,9 +58,12 @@ impl<T: Scalar> Road<T> {
         for i in 1..PREVIEW {
             s[i] = s[i - 1] + ((v_x[i - 1] + v_x[i]) * 0.5).larger(PACE_MIN) * p.t_s;
         }
-        let friction = |i: usize| if rows[i][2].re() > 0.0 { rows[i][2] } else { T::from(p.mu) };
-        let limit = permitted(&s, &kappa, friction, p);
-        Self { s, kappa, v_x, limit, period: p.t_s }
+        let mu =
+            std::array::from_fn(
+                |i| if rows[i][2].re() > 0.0 { rows[i][2].larger(FRICTION_MIN) } else { T::from(p.mu) },
+            );
+        let limit = permitted(&s, &kappa, &mu, p);
+        Self { s, kappa, v_x, mu, limit, period: p.t_s }
     }
 
     /// Finds a distance [m], looking from the place found `last` on: a plan goes forward.
@@ -83,9 +91,14 @@ impl<T: Scalar> Road<T> {
         Place { before, fraction: T::from(position - before as f64) }.of(&self.v_x)
     }
 
-    /// Curvature at a place [1/m] and the speed that grip permits there [m/s].
-    pub fn at(&self, place: &Place<T>) -> (T, T) {
-        (place.of(&self.kappa), place.of(&self.limit))
+    /// Friction at a distance [1].
+    pub fn friction(&self, s: T) -> T {
+        self.find(s, 0).of(&self.mu)
+    }
+
+    /// Curvature [1/m] and friction [1] at a place, and the speed that grip permits there [m/s].
+    pub fn at(&self, place: &Place<T>) -> (T, T, T) {
+        (place.of(&self.kappa), place.of(&self.mu), place.of(&self.limit))
     }
 }
 
@@ -104,13 +117,13 @@ impl<T: Scalar> Place<T> {
 ///
 /// In a curve the lateral acceleration takes it, before a curve the braking; where both are needed they share the circle of
 /// friction. Passed from the end of the preview to its beginning, as for the speed profile of a racing line.
-fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, friction: impl Fn(usize) -> T, p: &Parameters) -> Row<T> {
+fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, mu: &Row<T>, p: &Parameters) -> Row<T> {
     let mut limit = [T::from(NO_LIMIT); PREVIEW];
     if p.grip_max == 0.0 {
         return limit;
     }
     for i in (0..PREVIEW).rev() {
-        let grip = friction(i) * (p.grip_max * p.g);
+        let grip = mu[i] * (p.grip_max * p.g);
         let curvature = if kappa[i].re() < 0.0 { -kappa[i] } else { kappa[i] };
         if curvature.re() > STRAIGHT {
             limit[i] = (grip / curvature).sqrt();

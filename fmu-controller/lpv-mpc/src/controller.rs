@@ -200,9 +200,9 @@ impl Controller {
         let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-        tyres.observe(&x, &delivered);
-        self.snapshot.tyres[1] = *tyres.present();
         let road = inputs.road(p);
+        tyres.observe(&x, &delivered, road.friction(0.0));
+        self.snapshot.tyres[1] = *tyres.present();
         let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &disturbance);
         let u_prev = self.u_prev;
         let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &disturbance);

@@ -16,6 +16,8 @@ use crate::parameters::Parameters;
 pub struct Path<T> {
     /// Curvature at the beginning and at the end of the stage [1/m].
     pub kappa: [T; 2],
+    /// Friction in the middle of the stage [1].
+    pub mu: T,
     /// Speed to be followed at the end of the stage [m/s].
     pub v_x: T,
 }
@@ -27,8 +29,9 @@ pub struct Guide<'a, T> {
     /// Distance of the stage's beginning [m], and the preview's element before it.
     s: T,
     before: usize,
-    /// Curvature there [1/m].
+    /// Curvature [1/m] and friction [1] there.
     kappa: T,
+    mu: T,
     /// Time on the reference [s].
     time: f64,
     /// The fastest and the slowest that the car can be.
@@ -89,15 +92,8 @@ impl<'a, T: Scalar> Guide<'a, T> {
             drag: body.drag / body.m,
         });
         let place = road.find(at.distance, 0);
-        Self {
-            road,
-            s: at.distance,
-            before: place.before(),
-            kappa: road.at(&place).0,
-            time: latency,
-            reach,
-            period: p.t_s,
-        }
+        let (kappa, mu, _) = road.at(&place);
+        Self { road, s: at.distance, before: place.before(), kappa, mu, time: latency, reach, period: p.t_s }
     }
 
     /// The path under the next stage, on which the car makes way at `pace` [m/s].
@@ -106,7 +102,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
         self.time += self.period;
         let place = self.road.find(self.s, self.before);
         self.before = place.before();
-        let (kappa, limit) = self.road.at(&place);
+        let (kappa, mu, limit) = self.road.at(&place);
         for reach in &mut self.reach {
             reach.advance(self.period);
         }
@@ -123,8 +119,8 @@ impl<'a, T: Scalar> Guide<'a, T> {
         } else {
             permitted
         };
-        let path = Path { kappa: [self.kappa, kappa], v_x };
-        self.kappa = kappa;
+        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, v_x };
+        (self.kappa, self.mu) = (kappa, mu);
         path
     }
 }

@@ -31,8 +31,9 @@ pub trait TyreModel {
     /// Begins a new pass along the horizon.
     fn restart(&mut self) {}
 
-    /// Axle forces around a state and input of the schedule; called for one stage after the other.
-    fn at(&mut self, x: &State, u: &Input) -> Tyres;
+    /// Axle forces around a state and input of the schedule, on a road of friction `mu` [1]; called for one stage after the
+    /// other.
+    fn at(&mut self, x: &State, u: &Input, mu: f64) -> Tyres;
 }
 
 impl TyreModel for Tyres {
@@ -40,7 +41,7 @@ impl TyreModel for Tyres {
         *self
     }
 
-    fn at(&mut self, _x: &State, _u: &Input) -> Tyres {
+    fn at(&mut self, _x: &State, _u: &Input, _mu: f64) -> Tyres {
         *self
     }
 }
@@ -211,8 +212,8 @@ impl<const N_X: usize> Mpc<N_X> {
         self.schedule.u.copy_from_slice(&self.plan.u);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
-            self.tyres[i] = tyres.at(&at.0, &at.1);
             let path = guide.advance(|kappa| progress(&at.0, kappa));
+            self.tyres[i] = tyres.at(&at.0, &at.1, path.mu);
             *stage = linearise(&at, &path, &self.tyres[i], &around).into();
         }
     }

@@ -94,12 +94,13 @@ pub(crate) fn along<const N_X: usize>(
     }
     let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
     let (x, disturbance) = snapshot.estimate(direction, p, body);
-    let mut neighbours = adapter.neighbours(snapshot.memory, &x, &snapshot.delivered);
+    let road = snapshot.inputs.road_along(direction, p);
+    let mu = road.friction(Dual64::from(0.0));
+    let mut neighbours = adapter.neighbours(snapshot.memory, &x, &snapshot.delivered, mu);
     let present = match &neighbours {
         Some(neighbours) => neighbours.present(&snapshot.tyres[1]),
         None => fixed(&snapshot.tyres[1]),
     };
-    let road = snapshot.inputs.road_along(direction, p);
     let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &disturbance);
     let since = snapshot.step + p.input_delay;
     let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, &hold), &disturbance);
@@ -113,7 +114,7 @@ pub(crate) fn along<const N_X: usize>(
         let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
         let path = guide.advance(|kappa| progress(&scheduled.0, kappa));
         let tyres = match &mut neighbours {
-            Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.0, &scheduled.1),
+            Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.0, &scheduled.1, path.mu),
             None => fixed(&mpc.tyres[i]),
         };
         let linear = linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around);

@@ -22,6 +22,7 @@ fn inputs(t: f64) -> Inputs {
         e_psi: 0.01 * (0.7 * t).sin(),
         kappa_ref: Preview::from_fn(|i, _| 0.006 * (1.5 * (t + i as f64 * 0.033)).sin()),
         v_x_ref: Preview::from_fn(|i, _| 14.0 + 0.2 * (t + i as f64 * 0.033).cos()),
+        mu_ref: Preview::from_fn(|i, _| 0.7 + 0.2 * (2.0 * t + i as f64 * 0.066).sin()),
         ..Inputs::default()
     }
 }
@@ -35,6 +36,7 @@ fn directions() -> Vec<(&'static str, Inputs)> {
     let mut draw = || rng.random_range(-1.0..1.0);
     let curvature = Preview::from_fn(|_, _| 0.01 * draw());
     let speed = Preview::from_fn(|_, _| draw());
+    let friction = Preview::from_fn(|_, _| draw());
     vec![
         ("v_x", Inputs { v_x: 1.0, ..zero() }),
         ("v_y", Inputs { v_y: 1.0, ..zero() }),
@@ -43,6 +45,7 @@ fn directions() -> Vec<(&'static str, Inputs)> {
         ("e_psi", Inputs { e_psi: 1.0, ..zero() }),
         ("kappa_ref", Inputs { kappa_ref: curvature, ..zero() }),
         ("v_x_ref", Inputs { v_x_ref: speed, ..zero() }),
+        ("mu_ref", Inputs { mu_ref: friction, ..zero() }),
     ]
 }
 
