@@ -1,14 +1,19 @@
 //! Does a controller step fit in its period, and what does it cost beyond its quadratic programme?
 //!
 //! A slalom in which no bound is active is driven once and its measurements are recorded; each bench replays them through whole
-//! controllers. `quadratic programme` is the structured solver alone on the problems of the same drive, warm-started the same
-//! way. Times are per sample.
+//! controllers, one sample per communication step. `quadratic programme` is the structured solver alone on the problems of the
+//! same drive, warm-started the same way. Everything else of a step is measured with it: the tyres, the prediction over the
+//! latency, the linear models of all stages and their discretisation, the outputs.
+//!
+//! First come the ratios that the question asks for, from turns that all kinds of step take one after the other, so that a
+//! machine that slows down slows all of them; each kind counts with its best turn. Criterion's times follow, per sample.
 
 use std::fs;
 use std::hint::black_box;
 use std::path::Path;
+use std::time::Instant;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lpv_mpc::jordan::Network;
 use lpv_mpc::model::{Disturbance, Input, State, derivative};
 use lpv_mpc::preview::Preview;
@@ -17,6 +22,8 @@ use lpv_mpc::{Adaptation, Controller, Estimation, Inputs, Parameters};
 
 const T_S: f64 = 0.033;
 const SAMPLES: usize = 300;
+/// Turns of each kind for the ratios; the best of fewer still jumps on a machine with other work.
+const TURNS: usize = 100;
 
 fn kappa(t: f64) -> f64 {
     0.008 * (1.5 * t).sin()
@@ -47,7 +54,7 @@ fn drive(parameters: &Parameters) -> (Vec<Inputs>, Vec<Problem<5, 2>>) {
             e_psi: x[4],
             kappa_ref: Preview::from_fn(|i, _| kappa(t + i as f64 * T_S)),
             v_x_ref: Preview::repeat(15.0),
-            hold_preview: false,
+            ..Inputs::default()
         };
         let applied = Input::from([controller.output().delta, controller.output().a_x]);
         controller.advance(t, T_S, &inputs).expect("a valid step");
@@ -62,42 +69,87 @@ fn drive(parameters: &Parameters) -> (Vec<Inputs>, Vec<Problem<5, 2>>) {
     (measured, problems)
 }
 
+/// Kinds of steps, from the cheapest to all that there is.
+fn kinds(horizon: usize) -> [(&'static str, Parameters); 7] {
+    let measured =
+        |adaptation| Parameters { horizon, adaptation, estimation: Estimation::Measured, ..Parameters::default() };
+    let kalman = |adaptation| Parameters { estimation: Estimation::Kalman, ..measured(adaptation) };
+    let all = kalman(Adaptation::NetworkHorizon);
+    [
+        ("constant", measured(Adaptation::Constant)),
+        ("network now", measured(Adaptation::NetworkNow)),
+        ("network along the horizon", measured(Adaptation::NetworkHorizon)),
+        ("Kalman filter, constant", kalman(Adaptation::Constant)),
+        ("Kalman filter, network now", kalman(Adaptation::NetworkNow)),
+        ("Kalman filter, network along the horizon", all.clone()),
+        ("the same with lags and delay", Parameters { tau_delta: 0.1, tau_a_x: 0.2, input_delay: 0.05, ..all }),
+    ]
+}
+
+/// One turn of a whole controller through its recorded measurements.
+fn replay(controller: &mut Controller, measured: &[Inputs]) -> f64 {
+    for (k, inputs) in measured.iter().enumerate() {
+        controller.advance(k as f64 * T_S, T_S, black_box(inputs)).expect("a valid step");
+    }
+    controller.output().delta
+}
+
+/// One turn of the solver alone.
+fn solve_all(problems: &[Problem<5, 2>], solver: &mut Structured<5, 2>, solution: &mut Solution<5, 2>) -> u32 {
+    solver.reset();
+    for problem in problems {
+        solver.shift();
+        solver.solve(black_box(problem), solution);
+    }
+    solution.iterations
+}
+
+/// Prints what each kind of step costs, as a multiple of the quadratic programme alone.
+#[allow(clippy::print_stdout, reason = "the answer of this bench")]
+fn ratios(horizon: usize) {
+    let kinds = kinds(horizon);
+    let recorded: Vec<_> = kinds.iter().map(|(_, p)| (drive(p).0, controller(p))).collect();
+    let problems = drive(&kinds[0].1).1;
+    let (mut solver, mut solution) = (Structured::new(horizon), Solution::new(horizon));
+    let mut best = [f64::INFINITY; 8];
+    let mut take = |place: usize, turn: &mut dyn FnMut()| {
+        let start = Instant::now();
+        turn();
+        best[place] = best[place].min(start.elapsed().as_secs_f64() / SAMPLES as f64);
+    };
+    for _ in 0..TURNS {
+        take(0, &mut || {
+            black_box(solve_all(&problems, &mut solver, &mut solution));
+        });
+        for (place, (measured, fresh)) in recorded.iter().enumerate() {
+            let mut controller = fresh.clone();
+            take(place + 1, &mut || {
+                black_box(replay(&mut controller, measured));
+            });
+        }
+    }
+    println!("N = {horizon}: quadratic programme alone {:.2} us", best[0] * 1e6);
+    for (time, (name, _)) in best[1..].iter().zip(&kinds) {
+        println!("{name:>42}: {:6.2} us, {:.2} times the programme", time * 1e6, time / best[0]);
+    }
+}
+
 fn step(c: &mut Criterion) {
     for horizon in [10, 40] {
+        ratios(horizon);
+        let kinds = kinds(horizon);
         let mut group = c.benchmark_group(format!("step, N = {horizon}"));
         group.throughput(Throughput::Elements(SAMPLES as u64));
-        let plain = Parameters { horizon, estimation: Estimation::Measured, ..Parameters::default() };
-        let (_, problems) = drive(&plain);
+        let problems = drive(&kinds[0].1).1;
         group.bench_function("quadratic programme", |b| {
             let (mut solver, mut solution) = (Structured::new(horizon), Solution::new(horizon));
-            b.iter(|| {
-                solver.reset();
-                for problem in &problems {
-                    solver.shift();
-                    solver.solve(black_box(problem), &mut solution);
-                }
-                solution.iterations
-            });
+            b.iter(|| solve_all(&problems, &mut solver, &mut solution));
         });
-        let kalman = Parameters { estimation: Estimation::Kalman, ..plain.clone() };
-        let network = Parameters { adaptation: Adaptation::NetworkHorizon, ..kalman.clone() };
-        let lags = Parameters { tau_delta: 0.1, tau_a_x: 0.2, input_delay: 0.05, ..network.clone() };
-        for (name, parameters) in
-            [("measured", plain), ("Kalman filter", kalman), ("and network", network), ("and lags, delay", lags)]
-        {
-            let (measured, _) = drive(&parameters);
-            let fresh = controller(&parameters);
+        for (name, parameters) in &kinds {
+            let measured = drive(parameters).0;
+            let fresh = controller(parameters);
             group.bench_with_input(BenchmarkId::new("step", name), &measured, |b, measured| {
-                b.iter_batched_ref(
-                    || fresh.clone(),
-                    |controller| {
-                        for (k, inputs) in measured.iter().enumerate() {
-                            controller.advance(k as f64 * T_S, T_S, black_box(inputs)).expect("a valid step");
-                        }
-                        controller.output().delta
-                    },
-                    criterion::BatchSize::SmallInput,
-                );
+                b.iter_batched_ref(|| fresh.clone(), |controller| replay(controller, measured), BatchSize::SmallInput);
             });
         }
         group.finish();

@@ -86,26 +86,83 @@ pub struct Discrete<T = f64> {
     pub d: State<T>,
 }
 
-/// `A z`, with the zeros of the embedding left out.
-fn times<T: Scalar>(A: &SMatrix<T, NX, NX>, z: &State<T>) -> State<T> {
-    State::from([
-        A[(V_X, V_X)] * z[V_X] + A[(V_X, V_Y)] * z[V_Y] + A[(V_X, YAW_RATE)] * z[YAW_RATE],
-        A[(V_Y, V_Y)] * z[V_Y] + A[(V_Y, YAW_RATE)] * z[YAW_RATE],
-        A[(YAW_RATE, V_Y)] * z[V_Y] + A[(YAW_RATE, YAW_RATE)] * z[YAW_RATE],
-        A[(E_Y, V_Y)] * z[V_Y] + A[(E_Y, E_PSI)] * z[E_PSI],
-        A[(E_PSI, V_X)] * z[V_X] + A[(E_PSI, V_Y)] * z[V_Y] + z[YAW_RATE],
-    ])
+/// Two columns of a matrix side by side, those of `v_y` and `yaw_rate`: a row for each state.
+type Lateral<T> = [SVector<T, 2>; NX];
+
+/// The columns of a polynomial of `A` that inputs and affine term excite.
+///
+/// Below the coupling through the speed, `A` is block triangular: a lateral motion never leaves the columns of `v_y` and
+/// `yaw_rate`, which are the same sums on two numbers, and the column of `v_x` reaches the errors on the path alone.
+struct Columns<T> {
+    v_x: State<T>,
+    lateral: Lateral<T>,
 }
 
-/// `w_0 (I + w_1 A (I + w_2 A (I + w_3 A))) e_j`.
-fn series<T: Scalar>(A: &SMatrix<T, NX, NX>, column: usize, weights: &[f64; ORDER]) -> State<T> {
-    let mut z = State::zeros();
-    z[column] = T::one();
-    for k in (1..ORDER).rev() {
-        z = times(A, &z) * T::from(weights[k]);
-        z[column] += T::one();
+impl<T: Scalar> Columns<T> {
+    /// The columns of `A` itself.
+    #[inline(always)]
+    fn of(A: &SMatrix<T, NX, NX>) -> Self {
+        Self {
+            v_x: A.column(V_X).into_owned(),
+            lateral: std::array::from_fn(|row| SVector::from([A[(row, V_Y)], A[(row, YAW_RATE)]])),
+        }
     }
-    z * T::from(weights[0])
+
+    /// `A` times the columns, with the zeros of the embedding left out.
+    #[inline(always)]
+    fn multiplied(&self, A: &SMatrix<T, NX, NX>) -> Self {
+        let a = |row: usize, column: usize| A[(row, column)];
+        let v = &self.v_x;
+        let [v_x, v_y, yaw_rate, _, e_psi] = &self.lateral;
+        Self {
+            v_x: State::from([
+                a(V_X, V_X) * v[V_X],
+                T::zero(),
+                T::zero(),
+                a(E_Y, E_PSI) * v[E_PSI],
+                a(E_PSI, V_X) * v[V_X],
+            ]),
+            lateral: [
+                v_x * a(V_X, V_X) + v_y * a(V_X, V_Y) + yaw_rate * a(V_X, YAW_RATE),
+                v_y * a(V_Y, V_Y) + yaw_rate * a(V_Y, YAW_RATE),
+                v_y * a(YAW_RATE, V_Y) + yaw_rate * a(YAW_RATE, YAW_RATE),
+                v_y * a(E_Y, V_Y) + e_psi * a(E_Y, E_PSI),
+                v_x * a(E_PSI, V_X) + v_y * a(E_PSI, V_Y) + yaw_rate,
+            ],
+        }
+    }
+
+    #[inline(always)]
+    fn scaled(self, factor: f64) -> Self {
+        let factor = T::from(factor);
+        Self { v_x: self.v_x * factor, lateral: self.lateral.map(|row| row * factor) }
+    }
+
+    /// The columns plus those of the identity.
+    #[inline(always)]
+    fn plus_identity(mut self) -> Self {
+        self.v_x[V_X] += T::one();
+        self.lateral[V_Y][0] += T::one();
+        self.lateral[YAW_RATE][1] += T::one();
+        self
+    }
+
+    /// `w_0 (I + w_1 A (I + w_2 A (I + w_3 A)))`.
+    #[inline(always)]
+    fn series(A: &SMatrix<T, NX, NX>, weights: &[f64; ORDER]) -> Self {
+        let mut columns = Self::of(A).scaled(weights[ORDER - 1]).plus_identity();
+        for k in (1..ORDER - 1).rev() {
+            columns = columns.multiplied(A).scaled(weights[k]).plus_identity();
+        }
+        columns.scaled(weights[0])
+    }
+
+    /// The columns times a vector that is zero in the errors on the path.
+    #[inline(always)]
+    fn combine(&self, b: [T; 3]) -> State<T> {
+        let lateral = SVector::from([b[V_Y], b[YAW_RATE]]);
+        State::from_fn(|i, _| self.v_x[i] * b[V_X] + self.lateral[i].dot(&lateral))
+    }
 }
 
 /// Discretises the system over a hold.
@@ -125,34 +182,31 @@ fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let Lpv { A, B, d } = lpv;
     let h = hold.step;
     // Columns of the integral of the exponential: everything the inputs and the affine term excite lies in their span.
-    let weights = [h, h / 2.0, h / 3.0, h / 4.0];
-    let Psi = [V_X, V_Y, YAW_RATE].map(|j| series(A, j, &weights));
+    let Psi = Columns::series(A, &[h, h / 2.0, h / 3.0, h / 4.0]);
 
+    let moved = Psi.multiplied(A).plus_identity();
     let mut Phi = SMatrix::<T, NX, NX>::identity();
-    for (j, column) in Psi.iter().enumerate() {
-        let moved = times(A, column);
-        for i in 0..NX {
-            Phi[(i, j)] += moved[i];
-        }
+    for i in 0..NX {
+        Phi[(i, V_X)] = moved.v_x[i];
+        Phi[(i, V_Y)] = moved.lateral[i][0];
+        Phi[(i, YAW_RATE)] = moved.lateral[i][1];
     }
     // The columns of e_y and e_psi are exact after one term.
     Phi[(E_Y, E_PSI)] = A[(E_Y, E_PSI)] * h;
 
-    let combine = |columns: &[State<T>; 3], b: [T; 3]| columns[0] * b[0] + columns[1] * b[1] + columns[2] * b[2];
     let b_delta = [B[(V_X, DELTA)], B[(V_Y, DELTA)], B[(YAW_RATE, DELTA)]];
     let mut Lag = SMatrix::<T, NX, NU>::zeros();
     if hold.tau[DELTA] > 0.0 {
-        let columns = [V_X, V_Y, YAW_RATE].map(|j| series(A, j, &hold.moments[DELTA]));
-        Lag.set_column(DELTA, &combine(&columns, b_delta));
+        Lag.set_column(DELTA, &Columns::series(A, &hold.moments[DELTA]).combine(b_delta));
     }
     if hold.tau[A_X] > 0.0 {
-        Lag.set_column(A_X, &series(A, V_X, &hold.moments[A_X]));
+        Lag.set_column(A_X, &Columns::series(A, &hold.moments[A_X]).v_x);
     }
     Discrete {
         Phi,
-        Gamma: SMatrix::from_columns(&[combine(&Psi, b_delta), Psi[0]]),
+        Gamma: SMatrix::from_columns(&[Psi.combine(b_delta), Psi.v_x]),
         Lag,
-        d: combine(&Psi, [d[V_X], d[V_Y], d[YAW_RATE]]),
+        d: Psi.combine([d[V_X], d[V_Y], d[YAW_RATE]]),
     }
 }
 

@@ -72,16 +72,15 @@ impl Network {
     /// directions the network is differentiated exactly; the memory is held, being the past.
     #[must_use]
     pub fn linearise(&self, memory: &Memory, measured: &Measured) -> (Memory, Belief) {
-        let Document { l_f, l_r, inputs, outputs, .. } = &self.document;
-        let (alpha_f, alpha_r) = self.slip_angles(measured);
-        let mut along = [[0.0; super::WIDTH_MAX]; 2];
-        along[0][DELTA] = 1.0 / inputs[DELTA].deviation;
+        let Document { l_f, l_r, outputs, .. } = &self.document;
+        let (z_f, z_r) = self.drift(measured);
+        let (alpha_f, alpha_r) = (measured.delta - z_f.atan(), -z_r.atan());
+        let steer = [(DELTA, 1.0)];
         // alpha_r = -atan(z), so d alpha_r = -d z / (1 + z^2), and z falls by (l_f + l_r) / v_x for each unit of yaw rate.
-        let turn = measured.v_x * (1.0 + alpha_r.tan().powi(2)) / (l_f + l_r);
-        along[1][V_Y] = -l_f * turn / inputs[V_Y].deviation;
-        along[1][YAW_RATE] = turn / inputs[YAW_RATE].deviation;
+        let turn = measured.v_x * (1.0 + z_r * z_r) / (l_f + l_r);
+        let turn = [(V_Y, -l_f * turn), (YAW_RATE, turn)];
 
-        let ([c_f, c_r], slopes) = self.layers.forward_along(self.standardised(memory, measured), along);
+        let ([c_f, c_r], slopes) = self.layers.forward_along(&self.seen(memory, measured), [&steer, &turn]);
         if !(c_f.is_finite() && c_r.is_finite()) {
             return (*memory, self.hold(memory));
         }
@@ -91,7 +90,7 @@ impl Network {
         let belief = Belief {
             front: axle(alpha_f, secant_f, outputs[0].deviation * slopes[0][0]),
             rear: axle(alpha_r, secant_r, outputs[1].deviation * slopes[1][1]),
-            confidence: self.confidence(measured),
+            confidence: self.belief(measured, (alpha_f, alpha_r)),
         };
         (memory, belief)
     }

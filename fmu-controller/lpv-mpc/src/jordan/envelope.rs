@@ -31,14 +31,11 @@ impl Range {
     /// 1 inside, 0 beyond the margin and for what is not a number, a smooth step in between.
     fn belief(&self, value: f64) -> f64 {
         let outside = (self.min - value).max(value - self.max);
-        let t = 1.0 - outside / (MARGIN * (self.max - self.min));
-        if t >= 1.0 {
-            1.0
-        } else if t > 0.0 {
-            t * t * (3.0 - 2.0 * t)
-        } else {
-            0.0
+        if outside <= 0.0 {
+            return 1.0;
         }
+        let t = 1.0 - outside / (MARGIN * (self.max - self.min));
+        if t > 0.0 { t * t * (3.0 - 2.0 * t) } else { 0.0 }
     }
 }
 

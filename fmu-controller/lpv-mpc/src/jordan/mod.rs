@@ -83,7 +83,7 @@ impl TryFrom<Document> for Network {
 
     fn try_from(document: Document) -> Result<Self, Error> {
         document.check()?;
-        let layers = Layers::new(&document.layers);
+        let layers = Layers::new(&document.layers, &document.inputs);
         let contraction = contraction(&document.layers);
         Ok(Self { document, layers, contraction })
     }
@@ -150,35 +150,45 @@ impl Network {
     /// Inputs that are not numbers leave the memory as it was.
     #[must_use]
     pub fn step(&self, memory: &Memory, measured: &Measured) -> Memory {
-        let [c_f, c_r] = self.layers.forward(self.standardised(memory, measured));
+        let [c_f, c_r] = self.layers.forward(&self.seen(memory, measured));
         if c_f.is_finite() && c_r.is_finite() { Memory { c_f, c_r } } else { *memory }
     }
 
     /// How far the answer to these inputs may be believed: 1 inside the training envelope, 0 beyond its margin.
     #[must_use]
     pub fn confidence(&self, measured: &Measured) -> f64 {
-        let n = self.document.inputs.len();
-        self.document.envelope.belief(&measured.values()[..n], self.slip_angles(measured))
+        self.belief(measured, self.slip_angles(measured))
     }
 
     /// Front and rear slip angle of the trained vehicle [rad].
     #[must_use]
     pub fn slip_angles(&self, measured: &Measured) -> (f64, f64) {
-        let Document { l_f, l_r, .. } = self.document;
-        let Measured { v_x, v_y, yaw_rate, delta, .. } = *measured;
-        (delta - ((v_y + l_f * yaw_rate) / v_x).atan(), -((v_y - l_r * yaw_rate) / v_x).atan())
+        let (z_f, z_r) = self.drift(measured);
+        (measured.delta - z_f.atan(), -z_r.atan())
     }
 
-    /// Standardised inputs, followed by the memory.
+    /// Tangents of the angles at which the front and the rear axle move against the body [1].
     #[inline]
-    fn standardised(&self, memory: &Memory, measured: &Measured) -> Values {
+    fn drift(&self, measured: &Measured) -> (f64, f64) {
+        let Document { l_f, l_r, .. } = self.document;
+        let Measured { v_x, v_y, yaw_rate, .. } = *measured;
+        ((v_y + l_f * yaw_rate) / v_x, (v_y - l_r * yaw_rate) / v_x)
+    }
+
+    #[inline]
+    fn belief(&self, measured: &Measured, slip_angles: (f64, f64)) -> f64 {
+        let n = self.document.inputs.len();
+        self.document.envelope.belief(&measured.values()[..n], slip_angles)
+    }
+
+    /// What the layers see: the measured inputs, followed by the memory.
+    #[inline]
+    fn seen(&self, memory: &Memory, measured: &Measured) -> Values {
+        let n = self.document.inputs.len();
         let mut x = [0.0; WIDTH_MAX];
-        let inputs = &self.document.inputs;
-        for ((x, scaling), value) in x.iter_mut().zip(inputs).zip(measured.values()) {
-            *x = (value - scaling.mean) / scaling.deviation;
-        }
-        x[inputs.len()] = memory.c_f;
-        x[inputs.len() + 1] = memory.c_r;
+        x[..INPUTS_ACCELERATIONS].copy_from_slice(&measured.values());
+        x[n] = memory.c_f;
+        x[n + 1] = memory.c_r;
         x
     }
 }

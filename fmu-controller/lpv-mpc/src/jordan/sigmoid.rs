@@ -4,6 +4,8 @@
 //! This one is straight arithmetic: the compiler turns the loop into vector instructions, and the bits do not depend on a
 //! platform's library.
 
+use super::layers::LANES;
+
 /// `1.5 * 2^52`: adding it rounds to an integer and leaves that integer in the low bits of the mantissa.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// Upper part of ln 2, short enough that its product with an exponent is exact [fdlibm, e_exp.c].
@@ -13,8 +15,6 @@ const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 /// `exp(-36.8)` is the rounding of 1: beyond this the function is 0 or 1 within it, and the exponent cannot overflow.
 const SATURATED: f64 = 40.0;
 
-/// Elements that are computed side by side: short chains of dependent operations hide behind each other.
-const LANES: usize = 4;
 /// Coefficients of Taylor's polynomial, `1 / k!`.
 const TAYLOR: [f64; 13] = [
     1.0,
@@ -34,7 +34,7 @@ const TAYLOR: [f64; 13] = [
 
 /// `exp(x)` for `|x| <= 40`, relative error below 1e-15: `2^k exp(r)` with `|r| <= ln 2 / 2` and Taylor's polynomial of
 /// degree 12, whose first neglected term is 2e-16. Estrin's scheme instead of Horner's: a third of the latency.
-#[inline]
+#[inline(always)]
 fn exp(x: f64) -> f64 {
     let shifted = x * std::f64::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
@@ -46,7 +46,7 @@ fn exp(x: f64) -> f64 {
     p * f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
 }
 
-#[inline]
+#[inline(always)]
 fn logistic(z: f64) -> f64 {
     // The order of the comparisons maps to one instruction each and lets NaN through.
     let z = if z > SATURATED { SATURATED } else { z };
@@ -54,12 +54,22 @@ fn logistic(z: f64) -> f64 {
     1.0 / (1.0 + exp(-z))
 }
 
+/// The logistic function side by side: short chains of dependent operations hide behind each other.
+#[inline(always)]
+pub fn logistic_lanes(values: [f64; LANES]) -> [f64; LANES] {
+    let mut values = values;
+    for value in &mut values {
+        *value = logistic(*value);
+    }
+    values
+}
+
 /// `1 / (1 + exp(-z))` of every element, in place.
 #[inline]
 pub fn sigmoid(values: &mut [f64]) {
     let (chunks, rest) = values.as_chunks_mut::<LANES>();
     for chunk in chunks {
-        *chunk = chunk.map(logistic);
+        *chunk = logistic_lanes(*chunk);
     }
     for z in rest {
         *z = logistic(*z);
