@@ -12,6 +12,7 @@ pub mod output;
 pub mod pack;
 pub mod plots;
 pub mod recording;
+pub mod report;
 pub mod simulate;
 pub mod train;
 pub mod workspace;
@@ -46,6 +47,7 @@ enum Command {
     Demo(demo::Args),
     Merge(pack::merge::Args),
     Pack(pack::Args),
+    Report(report::Args),
     Simulate(simulate::Args),
     Train(Box<train::Args>),
 }
@@ -60,6 +62,7 @@ impl Cli {
             Command::Demo(args) => demo::run(args, &output),
             Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),
+            Command::Report(args) => report::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
             Command::Train(args) => train::run(args, &output),
         }

@@ -1,195 +1,198 @@
-//! The report of a run as one HTML page that needs no network: the plotting library is inside.
+//! Curves and charts as a browser draws them, and the pages that carry them: one file each, the plotting library inside.
 
-use plotly::common::{DashType, Line, Mode, Title};
-use plotly::layout::{Axis, Layout, Legend, Margin};
-use plotly::{Plot, Scatter};
+mod page;
+mod run;
 
-use crate::html::{document, escape, table};
-use crate::recording::{Recording, Tracking, tracking_rows};
+pub(crate) use page::{Page, assemble};
+pub(crate) use run::page;
+
+use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Marker, Mode, Orientation, Title};
+use plotly::layout::{Axis, AxisType, Layout, Legend, Margin};
+use plotly::{Bar, HeatMap, Plot, Scatter};
 
 /// Colours that stand out on white and on black.
 pub(crate) const BLUE: &str = "#2f80d0";
 pub(crate) const ORANGE: &str = "#e0821e";
 pub(crate) const GREY: &str = "#8a97a3";
+pub(crate) const GREEN: &str = "#2f9e6e";
+pub(crate) const RED: &str = "#d1495b";
+pub(crate) const PURPLE: &str = "#9272d6";
 
-/// Draws all plots again when the reader switches between light and dark.
-const SCRIPT: &str = "
-const dark = matchMedia('(prefers-color-scheme: dark)');
-function draw() {
-  const css = getComputedStyle(document.documentElement);
-  const ink = css.getPropertyValue('--ink').trim(), rule = css.getPropertyValue('--rule').trim();
-  for (const [id, plot] of Object.entries(plots)) {
-    const axis = old => ({...old, gridcolor: rule, zerolinecolor: rule, automargin: true});
-    const layout = {...plot.layout, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', font: {color: ink},
-      modebar: {bgcolor: 'rgba(0,0,0,0)', color: rule, activecolor: ink},
-      xaxis: axis(plot.layout.xaxis), yaxis: axis(plot.layout.yaxis)};
-    Plotly.react(id, plot.data, layout, {responsive: true, displaylogo: false});
-  }
-}
-dark.addEventListener('change', draw);
-draw();
-";
+/// Points of a curve that a page carries: more than a screen has columns.
+const POINTS: usize = 1600;
 
 /// One curve.
+#[derive(Clone, Debug)]
 pub(crate) struct Curve {
-    name: &'static str,
+    name: String,
     x: Vec<f64>,
     y: Vec<f64>,
     color: &'static str,
-    dashed: bool,
+    dash: DashType,
 }
 
 impl Curve {
-    pub(crate) fn new(name: &'static str, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
-        Self { name, x: x.to_vec(), y, color, dashed: false }
+    /// A solid line. Of long curves every peak is kept, whatever is left out.
+    pub(crate) fn new(name: impl Into<String>, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
+        let (x, y) = thinned(x, y);
+        Self { name: name.into(), x, y, color, dash: DashType::Solid }
     }
 
     pub(crate) fn dashed(self) -> Self {
-        Self { dashed: true, ..self }
+        Self { dash: DashType::Dash, ..self }
     }
+
+    pub(crate) fn dotted(self) -> Self {
+        Self { dash: DashType::Dot, ..self }
+    }
+}
+
+/// At most [`POINTS`] points: of each stretch the lowest and the highest, in their order.
+fn thinned(x: &[f64], y: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+    let length = (2 * y.len()).div_ceil(POINTS);
+    if length <= 2 {
+        return (x.iter().map(|x| digits(*x)).collect(), y.into_iter().map(digits).collect());
+    }
+    let (mut xs, mut ys) = (Vec::with_capacity(POINTS + 2), Vec::with_capacity(POINTS + 2));
+    for (x, y) in x.chunks(length).zip(y.chunks(length)) {
+        let pick = |better: fn(f64, f64) -> bool| {
+            (0..y.len()).reduce(|best, i| if better(y[i], y[best]) { i } else { best }).unwrap_or(0)
+        };
+        let (low, high) = (pick(|a, b| a < b), pick(|a, b| a > b));
+        for i in if low == high { vec![low] } else { vec![low.min(high), low.max(high)] } {
+            xs.push(digits(x[i]));
+            ys.push(digits(y[i]));
+        }
+    }
+    (xs, ys)
+}
+
+/// Six significant digits: finer than any screen, and a third of the page's size.
+fn digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// A plot with its place on the page.
+#[derive(Clone)]
 pub(crate) struct Chart {
-    id: &'static str,
-    title: &'static str,
-    note: &'static str,
+    id: String,
+    title: String,
+    note: String,
+    axes: [String; 2],
+    log: [bool; 2],
+    ranges: [Option<[f64; 2]>; 2],
     plot: Plot,
 }
 
-pub(crate) fn chart([id, title, note]: [&'static str; 3], [x, y]: [&str; 2], curves: Vec<Curve>) -> Chart {
+/// A chart of curves; `id` is unique on its page.
+pub(crate) fn chart(labels: [&str; 3], axes: [&str; 2], curves: Vec<Curve>) -> Chart {
     let mut plot = Plot::new();
     for curve in curves {
-        let dash = if curve.dashed { DashType::Dash } else { DashType::Solid };
-        let line = Line::new().color(curve.color).dash(dash).width(2.0);
-        let trace = Scatter::new(curve.x, curve.y).mode(Mode::Lines).name(curve.name).line(line);
-        plot.add_trace(trace);
+        let line = Line::new().color(curve.color).dash(curve.dash).width(2.0);
+        plot.add_trace(Scatter::new(curve.x, curve.y).mode(Mode::Lines).name(curve.name).line(line));
     }
-    plot.set_layout(
-        Layout::new()
-            .margin(Margin::new().left(60).right(10).top(30).bottom(45))
-            .legend(Legend::new().x(0.0).y(1.12).orientation(plotly::common::Orientation::Horizontal))
-            .x_axis(Axis::new().title(Title::with_text(x)))
-            .y_axis(Axis::new().title(Title::with_text(y))),
-    );
-    Chart { id, title, note, plot }
+    Chart::new(labels, axes, plot)
 }
 
-fn scaled(values: Vec<f64>, factor: f64) -> Vec<f64> {
-    values.into_iter().map(|value| value * factor).collect()
-}
-
-fn charts(run: &Recording) -> Vec<Chart> {
-    let t = run.column("t");
-    let [x, y, psi] = ["x", "y", "psi"].map(|name| run.column(name));
-    let [e_y, e_psi] = ["e_y_true", "e_psi_true"].map(|name| run.column(name));
-    // The path's own points, from the vehicle's position and its errors.
-    let path = |offset: fn(f64) -> f64, sign: f64, from: &[f64]| -> Vec<f64> {
-        let along = psi.iter().zip(&e_psi).map(|(psi, e_psi)| offset(psi - e_psi));
-        from.iter().zip(&e_y).zip(along).map(|((value, e_y), along)| value + sign * e_y * along).collect()
-    };
-    let (path_x, path_y) = (path(f64::sin, 1.0, &x), path(f64::cos, -1.0, &y));
-    let degrees = 180.0 / std::f64::consts::PI;
-    let time = "time [s]";
-    vec![
-        chart(
-            ["trajectory", "Trajectory", "Seen from above; the axes have different scales."],
-            ["X [m]", "Y [m]"],
-            vec![Curve::new("vehicle", &x, y, BLUE), Curve::new("path", &path_x, path_y, ORANGE).dashed()],
-        ),
-        chart(
-            ["lateral", "Lateral error", "Position relative to the path, positive to the left."],
-            [time, "e_y [cm]"],
-            vec![Curve::new("lateral error", &t, scaled(e_y, 100.0), BLUE)],
-        ),
-        chart(
-            [
-                "heading",
-                "Heading error",
-                "Heading of the body minus heading of the path: a car that turns drifts a little.",
-            ],
-            [time, "e_psi [deg]"],
-            vec![Curve::new("heading error", &t, scaled(e_psi, degrees), BLUE)],
-        ),
-        chart(
-            ["speed", "Speed", ""],
-            [time, "v_x [m/s]"],
-            vec![
-                Curve::new("vehicle", &t, run.column("v_x_true"), BLUE),
-                Curve::new("wanted", &t, run.column("v_x_ref[1]"), ORANGE).dashed(),
-            ],
-        ),
-        chart(
-            ["steering", "Steering angle", "What the controller commands and what the front wheels do."],
-            [time, "delta [deg]"],
-            vec![
-                Curve::new("wheels", &t, scaled(run.column("delta_actual"), degrees), BLUE),
-                Curve::new("command", &t, scaled(run.column("delta"), degrees), ORANGE).dashed(),
-            ],
-        ),
-        chart(
-            ["acceleration", "Acceleration", ""],
-            [time, "a_x [m/s\u{b2}]"],
-            vec![
-                Curve::new("vehicle", &t, run.column("a_x_actual"), BLUE),
-                Curve::new("command", &t, run.column("a_x"), ORANGE).dashed(),
-            ],
-        ),
-        chart(
-            ["grip", "Grip in use", "Share of what the tyres can give, the worse axle."],
-            [time, "grip [%]"],
-            vec![Curve::new("grip", &t, scaled(run.column("grip_usage"), 100.0), GREY)],
-        ),
-    ]
-}
-
-/// The page; `runs` are the columns of its table.
-pub fn page(title: &str, lead: &str, run: &Recording, runs: &[(&str, Tracking)]) -> String {
-    let mut rows = tracking_rows(runs);
-    let head = rows.remove(0);
-    let columns: Vec<(&str, bool)> =
-        head.iter().enumerate().map(|(column, name)| (name.as_str(), column > 1)).collect();
-    let cells: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| escape(cell)).collect()).collect();
-    assemble(title, lead, &table(&columns, &cells), &charts(run))
-}
-
-/// A page with some markup above its charts.
-pub(crate) fn assemble(title: &str, lead: &str, above: &str, charts: &[Chart]) -> String {
-    let mut body = format!("<h1>{}</h1>\n<p class=\"lead\">{}</p>\n{above}", escape(title), escape(lead));
-    let mut plots = String::from("const plots = {\n");
-    for chart in charts {
-        body.push_str(&format!(
-            "<h2>{}</h2>\n<p class=\"note\">{}</p>\n<div class=\"plot\" id=\"{}\"></div>\n",
-            escape(chart.title),
-            escape(chart.note),
-            chart.id
-        ));
-        plots.push_str(&format!("{}: {},\n", chart.id, chart.plot.to_json()));
+/// A chart of groups of bars: each group has a name, its values and its colour.
+pub(crate) fn bars(
+    labels: [&str; 3],
+    axes: [&str; 2],
+    x: &[f64],
+    groups: Vec<(String, Vec<f64>, &'static str)>,
+) -> Chart {
+    let mut plot = Plot::new();
+    for (name, y, color) in groups {
+        plot.add_trace(Bar::new(x.to_vec(), y).name(name).marker(Marker::new().color(color)));
     }
-    body.push_str(&format!("<script>\n{plots}}};\n{SCRIPT}</script>\n"));
-    document(title, &library(), &body)
+    Chart::new(labels, axes, plot)
 }
 
-/// The plotting library without the formula renderer that comes with it: the page shows no formulas and halves in size.
-fn library() -> String {
-    let sources = Plot::offline_js_sources();
-    let end = sources.find("</script>").map_or(sources.len(), |at| at + "</script>".len());
-    sources[..end].to_owned() + "\n"
+/// A map of values over two quantities; `z` has a row for each value of `y`.
+pub(crate) fn heat_map(labels: [&str; 3], axes: [&str; 2], x: &[f64], y: &[f64], z: Vec<Vec<f64>>) -> Chart {
+    let mut plot = Plot::new();
+    let scale = ColorScale::Palette(ColorScalePalette::Viridis);
+    plot.add_trace(HeatMap::new(x.to_vec(), y.to_vec(), z).color_scale(scale));
+    Chart::new(labels, axes, plot)
+}
+
+impl Chart {
+    fn new([id, title, note]: [&str; 3], axes: [&str; 2], plot: Plot) -> Self {
+        Self {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            note: note.to_owned(),
+            axes: axes.map(str::to_owned),
+            log: [false; 2],
+            ranges: [None; 2],
+            plot,
+        }
+    }
+
+    /// With a logarithmic vertical axis.
+    pub(crate) fn log_y(mut self) -> Self {
+        self.log[1] = true;
+        self
+    }
+
+    /// With a logarithmic horizontal axis.
+    pub(crate) fn log_x(mut self) -> Self {
+        self.log[0] = true;
+        self
+    }
+
+    /// Shows this part at first; a logarithmic axis takes powers of ten.
+    pub(crate) fn zoomed(mut self, x: Option<[f64; 2]>, y: Option<[f64; 2]>) -> Self {
+        self.ranges = [x, y];
+        self
+    }
+
+    /// With a place of its own on the page: many charts of one kind need different names.
+    pub(crate) fn named(mut self, id: String) -> Self {
+        self.id = id;
+        self
+    }
+
+    /// What the browser draws.
+    fn json(&self) -> String {
+        let axis = |i: usize| {
+            let axis = Axis::new().title(Title::with_text(&self.axes[i]));
+            let axis = if self.log[i] { axis.type_(AxisType::Log) } else { axis };
+            match self.ranges[i] {
+                Some([low, high]) => axis.range(vec![low, high]),
+                None => axis,
+            }
+        };
+        let mut plot = self.plot.clone();
+        plot.set_layout(
+            Layout::new()
+                .margin(Margin::new().left(60).right(10).top(30).bottom(45))
+                .legend(Legend::new().x(0.0).y(-0.22).orientation(Orientation::Horizontal))
+                .x_axis(axis(0))
+                .y_axis(axis(1)),
+        );
+        plot.to_json()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{PAPER, Row};
 
     #[test]
-    fn the_page_asks_the_network_for_nothing() {
-        let run = Recording { rows: vec![Row::default(); 2] };
-        let page = page("Title", "lead", &run, &[("paper", PAPER)]);
-        let own = page.replace(&library(), "");
-        assert!(own.len() < 100_000, "the library was not taken out: {}", own.len());
-        assert!(!own.contains("http") && !own.contains("src="), "{own}");
-        assert!(library().contains("Plotly") || library().contains("plotly"));
-        assert!(own.contains("lateral error, largest") && own.contains("2.300"));
+    fn thinning_keeps_every_peak_and_the_order() {
+        let x: Vec<f64> = (0..100_000).map(f64::from).collect();
+        let mut y = vec![0.0; x.len()];
+        (y[123], y[77_777]) = (5.0, -7.0);
+        let (xs, ys) = thinned(&x, y);
+        assert!(xs.len() <= POINTS + 2 && xs.is_sorted());
+        let at = |value: f64| ys.iter().position(|y| *y == value).map(|i| xs[i]);
+        assert_eq!((at(5.0), at(-7.0)), (Some(123.0), Some(77_777.0)));
+    }
+
+    #[test]
+    fn short_curves_keep_all_points() {
+        let x = [0.0, 1.0, 2.0];
+        assert_eq!(thinned(&x, vec![1.0, f64::NAN, 3.0]).0, x);
     }
 }

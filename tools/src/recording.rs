@@ -3,7 +3,7 @@
 use crate::output::table;
 
 /// Names of the plant's outputs that are recorded, with their units.
-pub const PLANT_COLUMNS: [(&str, &str); 18] = [
+pub const PLANT_COLUMNS: [(&str, &str); 20] = [
     ("x", "m"),
     ("y", "m"),
     ("psi", "rad"),
@@ -22,6 +22,8 @@ pub const PLANT_COLUMNS: [(&str, &str); 18] = [
     ("a_x_actual", "m/s2"),
     ("grip_usage", "1"),
     ("wind_speed_actual", "m/s"),
+    ("c_f_true", "N/rad"),
+    ("c_r_true", "N/rad"),
 ];
 
 /// Names of the controller's outputs that are recorded, with their units.
@@ -71,6 +73,25 @@ impl Recording {
             text += &join(row.iter().map(f64::to_string).collect());
         }
         text
+    }
+
+    /// The path's own points, from the vehicle's position and its errors.
+    pub fn path(&self) -> (Vec<f64>, Vec<f64>) {
+        let [x, y, psi, e_y, e_psi] = ["x", "y", "psi", "e_y_true", "e_psi_true"].map(|name| self.column(name));
+        let point = |i: usize| {
+            let (sin, cos) = (psi[i] - e_psi[i]).sin_cos();
+            (x[i] + e_y[i] * sin, y[i] - e_y[i] * cos)
+        };
+        (0..x.len()).map(point).unzip()
+    }
+
+    /// Direction of motion minus direction of the path [rad]: the heading error without the sideslip of the body.
+    ///
+    /// A car whose rear axle has to follow a curve cannot keep its body on the path's heading, whoever steers: its sideslip
+    /// follows from geometry and tyres. The course it can keep.
+    pub fn course_error(&self) -> Vec<f64> {
+        let [v_x, v_y, e_psi] = ["v_x_true", "v_y_true", "e_psi_true"].map(|name| self.column(name));
+        (0..v_x.len()).map(|i| e_psi[i] + v_y[i].atan2(v_x[i])).collect()
     }
 
     /// Every n-th sample and the last one: enough for a picture.
@@ -146,7 +167,7 @@ impl Tracking {
 }
 
 /// Largest magnitude. `f64::max` would drop a NaN: a run that went wrong must not look good.
-fn max(values: &[f64]) -> f64 {
+pub fn max(values: &[f64]) -> f64 {
     let worse = |max: f64, value: &f64| match value.abs() {
         value if max.is_nan() || value <= max => max,
         value => value,
@@ -154,7 +175,8 @@ fn max(values: &[f64]) -> f64 {
     values.iter().fold(0.0, worse)
 }
 
-fn rms(values: &[f64]) -> f64 {
+/// Root of the mean square.
+pub fn rms(values: &[f64]) -> f64 {
     let sum: f64 = values.iter().map(|value| value * value).sum();
     (sum / values.len().max(1) as f64).sqrt()
 }

@@ -9,7 +9,7 @@ use super::Law;
 
 /// States: lateral velocity, yaw rate, lateral error, heading error.
 const NX: usize = 4;
-/// State, steering and curvature together, for one matrix exponential.
+/// State, steering and the path's own yaw rate together, for one matrix exponential.
 const NZ: usize = NX + 2;
 const E_Y: usize = 2;
 
@@ -32,7 +32,7 @@ pub struct LinearMpc {
     solver: Structured<NX, 1>,
 }
 
-/// State transition, response to the steering angle and to the path's curvature.
+/// State transition, response to the steering angle and to the yaw rate of the path.
 struct Discrete {
     phi: SMatrix<f64, NX, NX>,
     gamma: SVector<f64, NX>,
@@ -89,7 +89,7 @@ impl LinearMpc {
             0.0,
             0.0,
             0.0,
-            -v,
+            -1.0,
         ]));
         let whole = (rate * step).exp();
         Discrete {
@@ -99,11 +99,11 @@ impl LinearMpc {
         }
     }
 
-    /// Steady cornering at speed `v` [m/s], on the path.
-    fn steady(&self, v: f64, kappa: f64) -> SVector<f64, NX> {
+    /// Steady cornering at speed `v` [m/s] with the path's yaw rate [rad/s], on the path.
+    fn steady(&self, v: f64, yaw_rate: f64) -> SVector<f64, NX> {
         let Parameters { m, l_f, l_r, c_r_nominal, .. } = self.parameters;
-        let v_y = kappa * v * (l_r - m * l_f * v * v / (c_r_nominal * (l_f + l_r)));
-        SVector::from([v_y, kappa * v, 0.0, -v_y / v])
+        let v_y = yaw_rate * (l_r - m * l_f * v * v / (c_r_nominal * (l_f + l_r)));
+        SVector::from([v_y, yaw_rate, 0.0, -v_y / v])
     }
 }
 
@@ -115,14 +115,14 @@ impl Law for LinearMpc {
         };
         let Discrete { phi, gamma, bend } = self.discretise(v, latency);
         let measured = SVector::from([seen.v_y, seen.yaw_rate, seen.e_y, seen.e_psi]);
-        self.problem.x_0 = phi * measured + gamma * delta + bend * seen.kappa_ref[0];
+        self.problem.x_0 = phi * measured + gamma * delta + bend * path_yaw_rate(seen, 0.0);
         self.problem.u_prev = SVector::from([delta]);
 
         let t_s = self.parameters.t_s;
         let Discrete { phi, gamma, bend } = self.discretise(v, t_s);
-        let kappa = |i: usize| curvature(seen, latency / t_s + i as f64);
+        let turn = |i: usize| path_yaw_rate(seen, latency / t_s + i as f64);
         for i in 0..self.problem.stages.len() {
-            let (before, after) = (kappa(i), kappa(i + 1));
+            let (before, after) = (turn(i), turn(i + 1));
             self.problem.stages[i] =
                 Stage { A: phi, B: gamma, d: bend * (0.5 * (before + after)), x_ref: self.steady(v, after) };
         }
@@ -133,13 +133,17 @@ impl Law for LinearMpc {
     }
 }
 
-/// Curvature of the path `periods` after now [1/m]: linear between what is given, held beyond it.
-fn curvature(seen: &Inputs, periods: f64) -> f64 {
+/// How fast the path turns `periods` after now, at the wanted speed [rad/s]: linear between what is given, held beyond it.
+///
+/// Also at a fixed speed the model is told this true rate; the curvature times the fixed speed would be off by as much as the
+/// speed is, and the general track's hairpin would not be survived.
+fn path_yaw_rate(seen: &Inputs, periods: f64) -> f64 {
     let last = seen.kappa_ref.len() - 1;
     let position = periods.clamp(0.0, last as f64);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the preview above")]
     let index = position as usize;
-    let (before, after) = (seen.kappa_ref[index], seen.kappa_ref[(index + 1).min(last)]);
+    let at = |i: usize| seen.kappa_ref[i] * seen.v_x_ref[i];
+    let (before, after) = (at(index), at((index + 1).min(last)));
     before + (position - index as f64) * (after - before)
 }
 
@@ -184,9 +188,10 @@ mod tests {
         let p = Parameters::default();
         let mut law = LinearMpc::new(&p, Linearisation::Measured);
         let (v, kappa) = (12.0, 2e-3);
-        let steady = law.steady(v, kappa);
+        let steady = law.steady(v, v * kappa);
         let mut seen = Inputs { v_x: v, v_y: steady[0], yaw_rate: steady[1], e_psi: steady[3], ..Inputs::default() };
         seen.kappa_ref.fill(kappa);
+        seen.v_x_ref.fill(v);
         let l = p.l_f + p.l_r;
         let want = kappa * (l + p.m * (p.l_r / p.c_f_nominal - p.l_f / p.c_r_nominal) / l * v * v);
         let got = law.steer(&seen, 0.001, want);

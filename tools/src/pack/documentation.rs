@@ -4,10 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use pulldown_cmark::{Options, Parser, html::push_html};
 
 use crate::archive::{Files, read, read_text};
-use crate::html::{document, escape, table};
+use crate::html::{document, escape, markdown, table};
 use crate::interface::{Interface, Variable};
 
 /// Sections of the variable list in the order in which a reader wants them.
@@ -18,7 +17,7 @@ pub fn add(files: &mut Files, interface: &Interface, folder: &Path) -> Result<()
     let mut chapters = Vec::new();
     for path in sorted(folder)? {
         if path.extension().is_some_and(|extension| extension == "md") {
-            chapters.push(markup(&read_text(&path)?));
+            chapters.push(markdown(&read_text(&path)?));
         } else if path.is_dir() {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             files.add_folder(&format!("documentation/{name}"), &path)?;
@@ -40,12 +39,6 @@ fn sorted(folder: &Path) -> Result<Vec<PathBuf>> {
         .collect::<Result<Vec<_>>>()?;
     paths.sort();
     Ok(paths)
-}
-
-fn markup(markdown: &str) -> String {
-    let mut markup = String::new();
-    push_html(&mut markup, Parser::new_ext(markdown, Options::ENABLE_TABLES));
-    markup.replace("<table>", "<div class=\"wide\"><table>").replace("</table>", "</table></div>")
 }
 
 fn page(interface: &Interface, chapters: &[String]) -> String {
@@ -150,7 +143,7 @@ mod tests {
     #[test]
     fn the_page_lists_every_variable_and_folds_arrays() {
         let interface = Interface::parse(DOCUMENT).unwrap();
-        let page = page(&interface, &[markup("# Timing\n\n| a | b |\n|---|---|\n| 1 | 2 |\n")]);
+        let page = page(&interface, &[markdown("# Timing\n\n| a | b |\n|---|---|\n| 1 | 2 |\n")]);
         for part in ["<h1>Timing</h1>", "<code>a</code>", "x &lt; 1", "<code>b[1..2]</code>", "<h3>Parameters</h3>"] {
             assert!(page.contains(part), "{part} is missing in\n{page}");
         }

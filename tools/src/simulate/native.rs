@@ -40,6 +40,16 @@ pub struct Shown {
     pub slack_e_y: f64,
 }
 
+impl<D: Driver + ?Sized> Driver for Box<D> {
+    fn advance(&mut self, t: f64, h: f64, seen: &lpv_mpc::Inputs) -> Result<()> {
+        (**self).advance(t, h, seen)
+    }
+
+    fn shown(&self) -> Shown {
+        (**self).shown()
+    }
+}
+
 impl Driver for Controller {
     fn advance(&mut self, t: f64, h: f64, seen: &lpv_mpc::Inputs) -> Result<()> {
         Ok(Self::advance(self, t, h, seen)?)
@@ -157,6 +167,8 @@ fn row(t: f64, plant: &Vehicle, driver: &impl Driver) -> Row {
         o.a_x_actual,
         o.grip_usage,
         o.wind_speed_actual,
+        o.c_f_true,
+        o.c_r_true,
         c.delta,
         c.a_x,
         c.c_f,

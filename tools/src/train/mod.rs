@@ -2,15 +2,15 @@
 
 #[cfg(feature = "adam")]
 mod adam;
-mod data;
-mod evaluate;
-mod learn;
-mod manoeuvre;
+pub(crate) mod data;
+pub(crate) mod evaluate;
+pub(crate) mod learn;
+pub(crate) mod manoeuvre;
 mod marquardt;
 mod page;
-mod recipe;
-mod score;
-mod session;
+pub(crate) mod recipe;
+pub(crate) mod score;
+pub(crate) mod session;
 mod stack;
 
 use std::path::PathBuf;

@@ -133,7 +133,7 @@ fn adam(_: &Recipe, _: &Scales, _: [&[Run]; 2], _: &Output) -> Result<Outcome> {
 }
 
 /// The network file's content, its scores still open.
-fn document(recipe: &Recipe, scales: &Scales, theta: &DVector<f64>, data: String) -> Result<Document> {
+pub fn document(recipe: &Recipe, scales: &Scales, theta: &DVector<f64>, data: String) -> Result<Document> {
     let plant = recipe.plant()?;
     let [c_f_nominal, c_r_nominal] = nominal(recipe, &plant)?;
     Ok(Document {

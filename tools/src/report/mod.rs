@@ -1,0 +1,106 @@
+//! `cargo fmu report`: the paper's tables and figures again, from code that runs, beside the paper's numbers and beside what a
+//! user would otherwise pick.
+
+mod charts;
+mod content;
+mod errata;
+mod learning;
+mod readme;
+mod reference;
+mod runs;
+mod timing;
+mod verdict;
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Parser;
+
+use crate::archive::write_whole;
+use crate::output::{Output, table};
+use crate::workspace::shown;
+use content::Findings;
+use runs::{Run, Situation, Who};
+
+/// Makes the paper's tables and figures again, with baselines, errata and computing times, as one page that needs no network.
+///
+/// Lane change and general track are driven by the controller as it ships, by linear MPC with PID as in the paper, by Stanley's
+/// law and by pure pursuit; an offline nonlinear MPC that knows the plant is the ceiling.
+#[derive(Clone, Debug, Parser)]
+#[command(after_help = "\
+Examples:
+  cargo fmu report                    page and data in target/report/
+  cargo fmu report --output here/     the same elsewhere
+  cargo fmu report --readme           write the results of README.md from a few seconds of driving
+  cargo fmu report --check            fail if they do not hold any more")]
+pub struct Args {
+    /// Folder for report.html and its data
+    #[arg(long, default_value = "target/report")]
+    pub output: PathBuf,
+    /// Write the results into README.md and do nothing else
+    #[arg(long, conflicts_with = "check")]
+    pub readme: bool,
+    /// Fail if a number in README.md does not hold any more
+    #[arg(long)]
+    pub check: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    if args.readme {
+        output.line(&format!("results: {}", shown(&readme::write()?)));
+        return Ok(());
+    }
+    if args.check {
+        readme::check()?;
+        output.line("README.md holds");
+        return Ok(());
+    }
+    let findings = find(output)?;
+    for line in table(&content::overview(&findings.runs, Situation::General)) {
+        output.line(&line);
+    }
+    output.line("");
+    for verdict in &findings.verdicts() {
+        let mark = if verdict.holds { "holds" } else { "MISSED" };
+        output.line(&format!("{mark:6}  {}: {} (asked: {})", verdict.name, verdict.got, verdict.asked));
+    }
+    for run in &findings.runs {
+        write_whole(&args.output.join(data_file(run)), content::samples(run).csv().as_bytes())?;
+    }
+    let page = args.output.join("report.html");
+    write_whole(&page, content::page(&findings).as_bytes())?;
+    output.line(&format!("\npage: {}\ndata: {} tables beside it", shown(&page), findings.runs.len()));
+    Ok(())
+}
+
+/// Name of a run's data beside the page.
+fn data_file(run: &Run) -> String {
+    format!("{}-{}.csv", run.situation.id(), run.who.id())
+}
+
+/// Drives, trains and times everything.
+fn find(output: &Output) -> Result<Findings> {
+    let reference = reference::Reference::open()?;
+    let bar = output.bar("driving", (Situation::ALL.len() * Who::ALL.len()) as u64);
+    let runs = runs::all(&reference, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let errata = errata::shots()?;
+    let late = content::late()?;
+    let learning = learning::learn(output)?;
+    let bar = output.bar("timing", Who::ALL.len() as u64);
+    // One after the other: a timing beside other work measures the other work.
+    let mut times = Vec::new();
+    for who in Who::ALL {
+        let seconds = match timing::times(who)? {
+            Some(seconds) => seconds,
+            None => reference.times(Situation::General.id())?,
+        };
+        times.push((who, seconds));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let parameters = lpv_mpc::Parameters::adaptive();
+    let stale = reference.stale(&parameters)?;
+    Ok(Findings { runs, errata, late, learning, times, stale })
+}
