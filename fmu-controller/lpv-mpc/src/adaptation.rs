@@ -4,13 +4,16 @@
 //! the latency; the plan either holds it (`network_now`, the paper's way) or rolls the network along the previous plan, one
 //! stage at a time, so that every stage has the tyre where it will be (`network_horizon`). Tangents carry the answer into the
 //! model: near the peak of the force the secant promises a response to steering that the tyre does not give.
+//!
+//! Where the network is not believed, or there is none for this car, the nominal tyres take over, and their force ends at what
+//! friction gives ([`Grip`]): a plan from far off the path, made with tyres that hold any slip, spins the car.
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::jordan::{Belief, Document, Measured, Memory, Network};
-use crate::model::{A_X, DELTA, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE};
+use crate::model::{A_X, Body, DELTA, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, slip_angles};
 use crate::mpc::TyreModel;
 use crate::parameters::Adaptation;
 
@@ -41,11 +44,47 @@ pub fn other_car(network: &Network, p: &Parameters) -> Option<String> {
     .map(|(name, trained, given)| format!("{name} was {trained}, it is {given} here"))
 }
 
+/// What the nominal tyres hold: the slope at small slip, bent towards friction times load.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Grip {
+    body: Body,
+    /// Static load of the front and the rear axle [N].
+    load: [f64; 2],
+    /// Friction that the nominal stiffnesses belong to [1].
+    mu: f64,
+}
+
+impl Grip {
+    fn new(p: &Parameters) -> Self {
+        let per_metre = p.m * p.g / (p.l_f + p.l_r);
+        Self { body: p.body(), load: [per_metre * p.l_r, per_metre * p.l_f], mu: p.mu }
+    }
+
+    /// Secants and tangents of `F = mu F_z tanh(C alpha / (mu_0 F_z))`, with the nominal slope at the friction `mu_0` that it
+    /// belongs to, and the limit of friction; up to the peak of the default magic formula within 2 % of the grip.
+    fn tyres(&self, nominal: &Tyres, x: &State, u: &Input, mu: f64) -> (Tyres, Tyres) {
+        let (alpha_f, alpha_r) = slip_angles(x, u[DELTA], &self.body);
+        let axle = |c: f64, alpha: f64, load: f64| {
+            let c = c * mu / self.mu;
+            let most = mu * load;
+            let used = (c * alpha / most).tanh();
+            // Below 1e-4 of the grip the curve is its slope to 3e-9.
+            let secant = if used.abs() > 1e-4 { most * used / alpha } else { c };
+            let slope = (c * (1.0 - used * used)).max(TANGENT_FLOOR * secant);
+            (secant, slope, (secant - slope) * alpha)
+        };
+        let (secant_f, c_f, f_f0) = axle(nominal.c_f, alpha_f, self.load[0]);
+        let (secant_r, c_r, f_r0) = axle(nominal.c_r, alpha_r, self.load[1]);
+        (Tyres::secant(secant_f, secant_r), Tyres { c_f, c_r, f_f0, f_r0 })
+    }
+}
+
 /// Tyres by the mode of adaptation, with the network's memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Adapter {
     mode: Adaptation,
     nominal: Tyres,
+    grip: Grip,
     network: Option<Network>,
     /// The network's last answer, one sample ago.
     memory: Memory,
@@ -64,8 +103,9 @@ impl Adapter {
         let network = network.filter(|network| other_car(network, p).is_none());
         let memory = network.as_ref().map_or_else(Memory::default, Network::nominal);
         Self {
-            mode: if network.is_some() { p.adaptation } else { Adaptation::Constant },
+            mode: p.adaptation,
             nominal,
+            grip: Grip::new(p),
             network,
             memory,
             rolled: memory,
@@ -74,9 +114,10 @@ impl Adapter {
         }
     }
 
-    /// Changes the nominal tyres.
-    pub fn tune(&mut self, nominal: Tyres) {
-        self.nominal = nominal;
+    /// Takes over nominal tyres and friction, which may change between samples.
+    pub fn tune(&mut self, p: &Parameters) {
+        let nominal = p.nominal_tyres();
+        (self.nominal, self.grip) = (nominal, Grip::new(p));
         if self.mode == Adaptation::Constant {
             self.present = nominal;
             self.believed = (nominal.c_f, nominal.c_r, 0.0);
@@ -85,16 +126,28 @@ impl Adapter {
 
     /// Takes in one sample: the state, what the actuators deliver, and the friction of the road [1].
     pub fn observe(&mut self, x: &State, u: &Input, mu: f64) {
-        let Some((memory, belief)) = self.ask(&self.memory, x, u) else {
-            self.present = self.nominal;
-            self.believed = (self.nominal.c_f, self.nominal.c_r, 0.0);
+        if self.mode == Adaptation::Constant {
             return;
+        }
+        let (memory, secant, tangent, confidence) = self.answer(&self.memory, x, u, mu);
+        (self.memory, self.present) = (memory, tangent);
+        self.believed = (secant.c_f, secant.c_r, confidence);
+    }
+
+    /// The next memory, secants, tangents and confidence at a state and input.
+    fn answer(&self, memory: &Memory, x: &State, u: &Input, mu: f64) -> (Memory, Tyres, Tyres, f64) {
+        let Some((memory, belief)) = self.ask(memory, x, u) else {
+            let (secant, tangent) = self.grip.tyres(&self.nominal, x, u, mu);
+            return (*memory, secant, tangent, 0.0);
         };
-        self.memory = memory;
         let share = self.share(mu);
-        self.present = scaled(&belief.tangent(&self.nominal, TANGENT_FLOOR), share);
-        let secant = scaled(&belief.secant(&self.nominal), share);
-        self.believed = (secant.c_f, secant.c_r, belief.confidence);
+        let (secant, tangent) = (scaled(&belief.secant(), share), scaled(&belief.tangent(TANGENT_FLOOR), share));
+        if belief.confidence == 1.0 {
+            return (memory, secant, tangent, 1.0);
+        }
+        let (nominal_secant, nominal_tangent) = self.grip.tyres(&self.nominal, x, u, mu);
+        let blend = |believed, nominal| blend(&believed, &nominal, belief.confidence);
+        (memory, blend(secant, nominal_secant), blend(tangent, nominal_tangent), belief.confidence)
     }
 
     /// What a friction [1] makes of the forces that the network knows.
@@ -144,7 +197,7 @@ impl Adapter {
 
     /// The network's answer, unless there is none to ask or the car is slower than any slip angle makes sense.
     fn ask(&self, memory: &Memory, x: &State, u: &Input) -> Option<(Memory, Belief)> {
-        if self.mode == Adaptation::Constant || x[V_X] < V_GUARD {
+        if x[V_X] < V_GUARD {
             return None;
         }
         let measured = Measured {
@@ -156,6 +209,17 @@ impl Adapter {
             ..Measured::default()
         };
         Some(self.network.as_ref()?.linearise(memory, &measured))
+    }
+}
+
+/// The nominal tyres with a share of what is believed instead.
+fn blend(believed: &Tyres, nominal: &Tyres, confidence: f64) -> Tyres {
+    let share = |believed: f64, nominal: f64| nominal + confidence * (believed - nominal);
+    Tyres {
+        c_f: share(believed.c_f, nominal.c_f),
+        c_r: share(believed.c_r, nominal.c_r),
+        f_f0: share(believed.f_f0, nominal.f_f0),
+        f_r0: share(believed.f_r0, nominal.f_r0),
     }
 }
 
@@ -222,9 +286,9 @@ impl TyreModel for Adapter {
             Adaptation::Constant => self.nominal,
             Adaptation::NetworkNow => self.present,
             Adaptation::NetworkHorizon => {
-                let Some((memory, belief)) = self.ask(&self.rolled, x, u) else { return self.nominal };
+                let (memory, _, tangent, _) = self.answer(&self.rolled, x, u, mu);
                 self.rolled = memory;
-                scaled(&belief.tangent(&self.nominal, TANGENT_FLOOR), self.share(mu))
+                tangent
             }
         }
     }

@@ -14,6 +14,7 @@ use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, Sta
 use crate::mpc::Mpc;
 use crate::parameters::{Adaptation, Estimation, HORIZON_MAX};
 use crate::qp::Problem;
+use crate::recovery::Recovery;
 use crate::sensitivity::{self, Snapshot};
 use crate::signals::{Inputs, Output};
 use crate::{Error, Parameters};
@@ -125,7 +126,7 @@ impl Controller {
         parameters.validate()?;
         self.parameters.clone_from(parameters);
         self.beliefs.body = parameters.body();
-        self.beliefs.tyres.tune(parameters.nominal_tyres());
+        self.beliefs.tyres.tune(parameters);
         with_mpc!(&mut self.core, mpc => mpc.tune(parameters));
         Ok(())
     }
@@ -206,9 +207,11 @@ impl Controller {
         let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &disturbance);
         let u_prev = self.u_prev;
         let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &disturbance);
+        let recovery = Recovery::new(&at, road.friction(at.distance), p);
+        let guide = recovery.iter().fold(guide, |guide, recovery| guide.no_faster_than(recovery.pace));
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
         let (status, command) = with_mpc!(core, mpc => {
-            let outcome = mpc.step(&at, &u_prev, &guide, &hold, body, tyres, &disturbance);
+            let outcome = mpc.step(&at, &u_prev, (&guide, recovery.as_ref()), &hold, body, tyres, &disturbance);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
             if mpc.plan.is_left() && sighted {
                 (Status::of(outcome, complete), mpc.plan.u[0])
@@ -229,7 +232,7 @@ impl Controller {
     ///
     /// # Errors
     /// [`Error::NoDerivative`] when the plan is not an exact optimum, is the first one (it finds its own schedule in several
-    /// passes), or when several samples followed each other in the step.
+    /// passes), leads a car back that is far off the path, or when several samples followed each other in the step.
     pub fn along(&self, direction: &Inputs) -> Result<Output, Error> {
         if self.sampled == 0 || self.output.status >= Status::PreviousPlan {
             return Ok(Output::initial(&Tyres::secant(0.0, 0.0)));
@@ -239,8 +242,9 @@ impl Controller {
         }
         let Self { parameters, beliefs: Beliefs { body, tyres }, latency, snapshot, .. } = self;
         let given = (parameters, body, tyres, latency);
-        with_mpc!(&self.core, mpc => sensitivity::along(mpc, snapshot, direction, given))
-            .ok_or(Error::NoDerivative("the plan is the first one or not an exact optimum"))
+        with_mpc!(&self.core, mpc => sensitivity::along(mpc, snapshot, direction, given)).ok_or(Error::NoDerivative(
+            "the plan is the first one, leads back from far off the path, or is not an exact optimum",
+        ))
     }
 
     /// State and disturbance at the measurement, and whether all of it was measured.

@@ -34,6 +34,8 @@ pub struct Guide<'a, T> {
     mu: T,
     /// Time on the reference [s].
     time: f64,
+    /// Speed that is not to be exceeded for other reasons than grip [m/s].
+    pace: f64,
     /// The fastest and the slowest that the car can be.
     reach: [Reach<T>; 2],
     period: f64,
@@ -93,7 +95,13 @@ impl<'a, T: Scalar> Guide<'a, T> {
         });
         let place = road.find(at.distance, 0);
         let (kappa, mu, _) = road.at(&place);
-        Self { road, s: at.distance, before: place.before(), kappa, mu, time: latency, reach, period: p.t_s }
+        let pace = f64::INFINITY;
+        Self { road, s: at.distance, before: place.before(), kappa, mu, time: latency, pace, reach, period: p.t_s }
+    }
+
+    /// The same, no faster than `pace` [m/s].
+    pub fn no_faster_than(self, pace: f64) -> Self {
+        Self { pace, ..self }
     }
 
     /// The path under the next stage, on which the car makes way at `pace` [m/s].
@@ -108,6 +116,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
         }
         let wanted = self.road.wanted(self.time);
         let permitted = if limit.re() < wanted.re() { limit } else { wanted };
+        let permitted = if self.pace < permitted.re() { T::from(self.pace) } else { permitted };
         let [fastest, slowest] = &self.reach;
         let v_x = if !wanted.re().is_finite() {
             // No speed to drive at; the solver refuses it.

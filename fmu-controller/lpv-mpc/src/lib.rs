@@ -34,6 +34,7 @@ pub mod mpc;
 pub mod parameters;
 pub mod preview;
 pub mod qp;
+mod recovery;
 mod scalar;
 mod sensitivity;
 pub mod signals;

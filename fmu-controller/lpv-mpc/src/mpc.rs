@@ -12,13 +12,26 @@ use crate::discretise::Hold;
 use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
+use crate::model::{Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
 use crate::parameters::Backend;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
+use crate::recovery::Recovery;
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
 /// change: the third changes the first command by less than 1e-3 of its bound.
 const FIRST_PASSES: usize = 3;
+
+/// Change of the planned steering from one sample to the next at which half of the new plan is scheduled [rad].
+///
+/// Where tyres saturate, or far off the path, the plan may alternate between two that contradict each other, each made around
+/// the other; smaller changes are the ordinary ones.
+const DAMPED: f64 = 0.01;
+
+/// Speed below which a car that is to stand holds its steering [m/s]: there sensor noise is larger than what steering corrects.
+const STANDSTILL: f64 = 0.2;
+
+/// Stages in which a car that is to stand does not drive away [1]: with the default rate of steering 0.1 rad are turned meanwhile.
+const NEAR: usize = 4;
 
 /// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
 const CLARABEL_TOLERANCE: f64 = 1e-10;
@@ -67,6 +80,11 @@ impl<const N_X: usize> Plan<N_X> {
         self.age < self.u.len()
     }
 
+    /// Nothing of it is left any more.
+    fn forget(&mut self) {
+        self.age = self.u.len();
+    }
+
     /// Moves on by one sample; the end is repeated.
     pub fn shift(&mut self) {
         self.x.rotate_left(1);
@@ -91,13 +109,19 @@ pub struct Mpc<const N_X: usize> {
     #[serde(skip, default = "clarabel")]
     clarabel: Clarabel<N_X, NU>,
     backend: Backend,
+    /// Bound on the lateral error near the path [m].
+    soft_bound: f64,
+    /// Largest change of the steering per period [rad].
+    steering_step: f64,
+    /// Fastest speed that the last plan had to follow at first [m/s].
+    fastest: f64,
     /// The plan that is executed.
     pub plan: Plan<N_X>,
     /// Trajectory around which the last problem was linearised, and the tyres of its stages.
     pub(crate) schedule: Plan<N_X>,
     pub(crate) tyres: Vec<Tyres>, // N
-    /// Whether the last answer is the structured solver's to a problem that followed from one schedule: then it can be
-    /// differentiated.
+    /// Whether the last answer is the structured solver's to a problem that followed from one schedule near the path: then it
+    /// can be differentiated.
     pub(crate) smooth: bool,
 }
 
@@ -111,6 +135,9 @@ impl<const N_X: usize> Mpc<N_X> {
             structured: Structured::new(p.horizon),
             clarabel: clarabel(),
             backend: p.backend,
+            soft_bound: p.e_y_max,
+            steering_step: p.delta_rate_max * p.t_s,
+            fastest: f64::INFINITY,
             plan: Plan::none(p.horizon),
             schedule: Plan::none(p.horizon),
             tyres: vec![p.nominal_tyres(); p.horizon],
@@ -134,8 +161,9 @@ impl<const N_X: usize> Mpc<N_X> {
         problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
         problem.u_max = Input::from([p.delta_max, p.a_x_max]);
         problem.du_max = Input::from([p.delta_rate_max, p.a_x_rate_max]) * p.t_s;
+        self.steering_step = problem.du_max[DELTA];
         problem.soft_state = E_Y;
-        problem.soft_bound = p.e_y_max;
+        self.soft_bound = p.e_y_max;
         problem.soft = p.e_y_penalty;
     }
 
@@ -145,7 +173,7 @@ impl<const N_X: usize> Mpc<N_X> {
         &mut self,
         at: &Predicted,
         u_prev: &Input,
-        guide: &Guide<'_, f64>,
+        (guide, recovery): (&Guide<'_, f64>, Option<&Recovery>),
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
@@ -156,15 +184,20 @@ impl<const N_X: usize> Mpc<N_X> {
         self.problem.u_prev = *u_prev;
         if continues {
             self.plan.shift();
+            self.schedule.shift();
             self.structured.shift();
         } else {
+            self.schedule.forget();
             self.structured.reset();
             self.expect_steady_driving(guide.clone(), body, &tyres.nominal());
         }
+        let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
+        self.problem.du_max[DELTA] = if stands { 0.0 } else { self.steering_step };
+        self.problem.soft_bound = self.soft_bound + recovery.map_or(0.0, |recovery| recovery.room);
         let passes = if continues { 1 } else { FIRST_PASSES };
         for _ in 0..passes {
             self.plan.x[0] = self.problem.x_0;
-            self.model(guide.clone(), hold, body, tyres, disturbance);
+            self.model((guide.clone(), recovery), hold, body, tyres, disturbance);
             if !self.solve() {
                 break;
             }
@@ -172,13 +205,16 @@ impl<const N_X: usize> Mpc<N_X> {
             self.plan.u.copy_from_slice(&self.solution.u);
             self.plan.age = 0;
         }
-        self.smooth = continues && self.backend == Backend::Structured && self.solution.outcome == Outcome::Optimal;
+        self.smooth = continues
+            && recovery.is_none()
+            && self.backend == Backend::Structured
+            && self.solution.outcome == Outcome::Optimal;
         self.solution.outcome
     }
 
     /// Drops the plan: the next sample begins anew, from steady driving on the reference.
     pub fn forget(&mut self) {
-        self.plan.age = self.plan.u.len();
+        self.plan.forget();
     }
 
     /// Iterations of the solver, its scaled optimality residual, and the largest excess over the soft bound [m].
@@ -197,10 +233,27 @@ impl<const N_X: usize> Mpc<N_X> {
         }
     }
 
+    /// Takes the plan for the schedule, and less of it the more its steering differs from the one before.
+    fn reschedule(&mut self) {
+        let Self { plan, schedule, .. } = self;
+        let steering = plan.u.iter().zip(&schedule.u).map(|(planned, scheduled)| (planned - scheduled)[DELTA].abs());
+        let share = if schedule.is_left() { (1.0 + steering.fold(0.0, f64::max) / DAMPED).recip() } else { 1.0 };
+        // Written so that all of the plan is the plan, to the last bit and whatever was scheduled before.
+        let mix = |before: f64, planned: f64| if share < 1.0 { before + share * (planned - before) } else { planned };
+        for (scheduled, planned) in schedule.x.iter_mut().zip(&plan.x) {
+            scheduled.zip_apply(planned, |scheduled, planned| *scheduled = mix(*scheduled, planned));
+        }
+        for (scheduled, planned) in schedule.u.iter_mut().zip(&plan.u) {
+            scheduled.zip_apply(planned, |scheduled, planned| *scheduled = mix(*scheduled, planned));
+        }
+        schedule.x[0] = plan.x[0];
+        schedule.age = 0;
+    }
+
     /// Fills the stages of the quadratic programme along the schedule.
     fn model(
         &mut self,
-        mut guide: Guide<'_, f64>,
+        (mut guide, recovery): (Guide<'_, f64>, Option<&Recovery>),
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
@@ -208,13 +261,21 @@ impl<const N_X: usize> Mpc<N_X> {
     ) {
         let around = Surroundings { body, nominal: tyres.nominal(), hold, disturbance: *disturbance };
         tyres.restart();
-        self.schedule.x.copy_from_slice(&self.plan.x);
-        self.schedule.u.copy_from_slice(&self.plan.u);
+        self.fastest = 0.0;
+        self.reschedule();
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
             let path = guide.advance(|kappa| progress(&at.0, kappa));
             self.tyres[i] = tyres.at(&at.0, &at.1, path.mu);
+            if i < NEAR {
+                self.fastest = self.fastest.max(path.v_x);
+            }
             *stage = linearise(&at, &path, &self.tyres[i], &around).into();
+            if let Some(recovery) = recovery {
+                let (e_y, e_psi) = recovery.at(i, path.v_x);
+                stage.x_ref[E_Y] += e_y;
+                stage.x_ref[E_PSI] += e_psi;
+            }
         }
     }
 

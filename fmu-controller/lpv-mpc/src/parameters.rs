@@ -141,7 +141,7 @@ impl Default for Parameters {
             q_v_x: 5.0,
             r_delta: 300.0,
             r_a_x: 0.1,
-            grip_max: 0.95,
+            grip_max: 0.9,
             estimation: Estimation::Kalman,
             ..Self::paper()
         }

@@ -33,34 +33,24 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// Forces proportional to slip; the nominal tyres take over as far as confidence lacks.
+    /// Forces proportional to slip.
     #[must_use]
-    pub fn secant(&self, nominal: &Tyres) -> Tyres {
-        self.blend(&Tyres::secant(self.front.secant, self.rear.secant), nominal)
+    pub fn secant(&self) -> Tyres {
+        Tyres::secant(self.front.secant, self.rear.secant)
     }
 
-    /// Forces as tangents, `F = F_0 + C_t alpha`; the nominal tyres take over as far as confidence lacks.
+    /// Forces as tangents, `F = F_0 + C_t alpha`.
     ///
     /// The force at the stage's own slip is the secant's. A tangent stiffness below `floor` times the secant one is held
     /// there: a prediction model with negative stiffness runs away within a horizon.
     #[must_use]
-    pub fn tangent(&self, nominal: &Tyres, floor: f64) -> Tyres {
+    pub fn tangent(&self, floor: f64) -> Tyres {
         let line = |axle: &Axle| {
             let slope = axle.tangent.max(floor * axle.secant);
             (slope, (axle.secant - slope) * axle.alpha)
         };
         let ((c_f, f_f0), (c_r, f_r0)) = (line(&self.front), line(&self.rear));
-        self.blend(&Tyres { c_f, c_r, f_f0, f_r0 }, nominal)
-    }
-
-    fn blend(&self, believed: &Tyres, nominal: &Tyres) -> Tyres {
-        let share = |believed: f64, nominal: f64| nominal + self.confidence * (believed - nominal);
-        Tyres {
-            c_f: share(believed.c_f, nominal.c_f),
-            c_r: share(believed.c_r, nominal.c_r),
-            f_f0: share(believed.f_f0, nominal.f_f0),
-            f_r0: share(believed.f_r0, nominal.f_r0),
-        }
+        Tyres { c_f, c_r, f_f0, f_r0 }
     }
 }
 

@@ -1,0 +1,89 @@
+//! The way back of a car that is far off its path.
+//!
+//! A plan whose reference is the path itself asks a car that stands 3 m beside it for all that steering and tyres give, and
+//! for the opposite on arrival: at speed the rate limit of the steering turns that into a spin. So the reference starts where
+//! the car is and comes back with a moderate share of the grip, and a car that heads away from the path is slowed down.
+//! Near the path nothing of this acts.
+
+use crate::latency::Predicted;
+use crate::model::{E_PSI, E_Y, V_X, V_Y};
+use crate::parameters::{HORIZON_MAX, Parameters};
+
+/// Share of the grip that the way back uses sideways [1]: the rest keeps the car on it in a curve.
+const SIDEWAYS: f64 = 0.4;
+
+/// Share of the grip that brakes a car on its way off the path [1]: with the above, 0.9 of it is used.
+const BRAKING: f64 = 0.8;
+
+/// Sine of the largest angle at which the way back meets the path [1]: a steeper way is hardly shorter, and a car that slows
+/// down on it would turn ever more across.
+const COURSE_MAX: f64 = 0.6;
+
+/// How quickly the car takes up the speed that leads it back [s]: a few times the lag of a car's yaw response.
+const TAKE_UP: f64 = 0.2;
+
+/// Share of the largest speed across the path from which the car still stops on it [1].
+const APPROACH: f64 = 0.8;
+
+/// Rate of the last part of the way back [1/s]: about that of the lateral error's own loop with the default weights.
+const LAST_RATE: f64 = 2.0;
+
+/// Distance over which a car that heads away from the path should be able to turn back [m]: half a lane.
+const TURN_BACK: f64 = 1.5;
+
+/// The car is not slowed down below this [m/s]: it has to move to come back.
+const PACE_MIN: f64 = 3.0;
+
+/// Reference across the path at the stages' ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Recovery {
+    /// Lateral error [m] and its rate [m/s].
+    way: [(f64, f64); HORIZON_MAX],
+    /// Speed that is low enough for the way back [m/s].
+    pub pace: f64,
+    /// By how much the soft bound gives way [m].
+    pub room: f64,
+}
+
+impl Recovery {
+    /// The way back from the beginning of a plan on a road of friction `mu` [1]; `None` near the path.
+    pub fn new(at: &Predicted, mu: f64, p: &Parameters) -> Option<Self> {
+        let x = &at.x;
+        let speed = x[V_X].hypot(x[V_Y]).max(PACE_MIN);
+        let (mut e, mut rate) = (x[E_Y], x[V_X] * x[E_PSI].sin() + x[V_Y] * x[E_PSI].cos());
+        let course = (rate / speed).abs().min(1.0);
+        let sideways = SIDEWAYS * mu * p.g;
+        // Across the path a car on a steep course is slowed down by its brakes rather than by its steering.
+        let braked = sideways * (1.0 - course * course).sqrt() + BRAKING * mu * p.g * course;
+        // How far it gets before it can turn back.
+        let away = if e * rate < 0.0 { 0.0 } else { rate * rate / (2.0 * braked) };
+        let far = ((e.abs() + away) / p.e_y_max - 1.0).clamp(0.0, 1.0);
+        // Fades in between one and two bounds, so that the reference does not jump; not for what is no number.
+        let weight = far * far * (3.0 - 2.0 * far);
+        if !(weight > 0.0 && p.grip_max > 0.0) {
+            return None;
+        }
+        let turn_back = (2.0 * sideways * e.abs().max(TURN_BACK)).sqrt();
+        let mut way = [(0.0, 0.0); HORIZON_MAX];
+        let mut room: f64 = 0.0;
+        for slot in &mut way {
+            let fastest =
+                (LAST_RATE * e.abs()).min(APPROACH * (2.0 * sideways * e.abs()).sqrt()).min(COURSE_MAX * speed);
+            let wanted = -e.signum() * fastest;
+            // What turns towards the path brakes where the car goes away from it.
+            let most = if wanted * rate < 0.0 { braked } else { sideways };
+            let change = ((wanted - rate) / TAKE_UP).clamp(-most, most) * p.t_s;
+            e += (rate + 0.5 * change) * p.t_s;
+            rate += change;
+            *slot = (weight * e, weight * rate);
+            room = room.max(weight * e.abs());
+        }
+        Some(Self { way, pace: (turn_back / course).max(PACE_MIN), room })
+    }
+
+    /// Lateral error [m] and heading error [rad] to add to the reference at the end of stage `i`, driven at `v_x` [m/s].
+    pub fn at(&self, i: usize, v_x: f64) -> (f64, f64) {
+        let (e, rate) = self.way[i];
+        (e, (rate / v_x.max(PACE_MIN)).clamp(-1.0, 1.0).asin())
+    }
+}
