@@ -8,13 +8,16 @@ pub mod demo;
 pub mod html;
 pub mod importer;
 pub mod interface;
+pub mod optimise;
 pub mod output;
 pub mod pack;
+pub mod parameter_set;
 pub mod plots;
 pub mod recording;
 pub mod report;
 pub mod simulate;
 pub mod train;
+pub mod tune;
 pub mod workspace;
 pub mod xml;
 
@@ -50,6 +53,7 @@ enum Command {
     Report(report::Args),
     Simulate(simulate::Args),
     Train(Box<train::Args>),
+    Tune(Box<tune::Args>),
 }
 
 impl Cli {
@@ -65,6 +69,7 @@ impl Cli {
             Command::Report(args) => report::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
             Command::Train(args) => train::run(args, &output),
+            Command::Tune(args) => tune::run(args, &output),
         }
     }
 }

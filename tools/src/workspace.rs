@@ -1,6 +1,9 @@
 //! Where things lie in the project: the root, the two models and the folder of the finished archives.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Result, ensure};
 
 /// Root of the project that this program was built from.
 pub fn root() -> PathBuf {
@@ -73,4 +76,19 @@ impl Model {
     pub fn description_file(&self) -> PathBuf {
         root().join("modelDescription").join(self.description)
     }
+}
+
+/// Runs this very command again with a feature turned on: what takes minutes to compile is compiled by those who ask for it.
+///
+/// # Errors
+/// If it does not end well.
+pub fn run_again_with(feature: &str) -> Result<()> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .current_dir(root())
+        .args(["run", "--release", "--package", "fmu-tools", "--bin", "fmu", "--features", feature, "--quiet", "--"])
+        .args(std::env::args_os().skip(1))
+        .status()?;
+    ensure!(status.success(), "the command with {feature} ended with {status}");
+    Ok(())
 }

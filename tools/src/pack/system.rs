@@ -6,14 +6,9 @@ use anyhow::{Context, Result, ensure};
 
 use crate::archive::Files;
 use crate::interface::{Interface, Kind, Variable};
+use crate::parameter_set::{ParameterSet, units};
 use crate::workspace::{CONTROLLER, Model, PLANT, SYSTEM};
 use crate::xml::Element;
-
-/// A named set of parameter values for one component.
-struct ParameterSet {
-    name: &'static str,
-    values: Vec<(&'static str, String)>,
-}
 
 /// The manoeuvres that are driven in closed loop, the default one last.
 ///
@@ -21,7 +16,7 @@ struct ParameterSet {
 /// a tool that applies all of them runs the lane change, and one that selects by name runs what was asked for.
 fn manoeuvres() -> Vec<ParameterSet> {
     ["general", "iso_3888_1", "iso_3888_2", "constant_radius", "circuit", "double_lane_change"]
-        .map(|name| ParameterSet { name, values: vec![("road", name.to_owned()), ("speed", "14".to_owned())] })
+        .map(|name| ParameterSet::new(name, vec![("road", name.to_owned()), ("speed", "14".to_owned())]))
         .into()
 }
 
@@ -41,7 +36,7 @@ fn tunings(controller: &Interface) -> Result<Vec<ParameterSet>> {
             Ok((*name, start.with_context(|| format!("parameter {name} has no start value"))?))
         })
         .collect::<Result<_>>()?;
-    Ok(vec![ParameterSet { name: "paper_weights", values }, ParameterSet { name: "shipped_weights", values: shipped }])
+    Ok(vec![ParameterSet::new("paper_weights", values), ParameterSet::new("shipped_weights", shipped)])
 }
 
 /// Collects the files of the system; `files` holds the two FMUs already.
@@ -50,7 +45,7 @@ pub fn of(controller: &Interface, plant: &Interface, mut files: Files) -> Result
     let (manoeuvres, tunings) = (manoeuvres(), tunings(controller)?);
     for (set, interface) in manoeuvres.iter().map(|set| (set, plant)).chain(tunings.iter().map(|set| (set, controller)))
     {
-        files.add(&format!("resources/{}.ssv", set.name), parameter_set(set, interface)?.document()?)?;
+        files.add(&format!("resources/{}.ssv", set.name), set.element(interface)?.document()?)?;
     }
     let elements = Element::new("ssd:Elements")
         .child(component(PLANT, plant, &wires, &manoeuvres, 0.0))
@@ -171,28 +166,6 @@ fn connector(variable: &Variable) -> Element {
         .child(kind)
 }
 
-/// Units of both FMUs, each once.
-fn units(interfaces: &[&Interface]) -> Element {
-    let mut seen = Vec::new();
-    let units = interfaces
-        .iter()
-        .flat_map(|interface| &interface.units)
-        .filter(|unit| {
-            let new = !seen.contains(&unit.get("name"));
-            seen.push(unit.get("name"));
-            new
-        })
-        .map(unit);
-    Element::new("ssd:Units").extend(units)
-}
-
-fn unit(unit: &Element) -> Element {
-    let base = unit.find("BaseUnit").map_or(&[][..], |base| &base.attributes);
-    Element::new("ssc:Unit")
-        .with("name", unit.get("name").unwrap_or_default())
-        .child(Element { attributes: base.to_vec(), ..Element::new("ssc:BaseUnit") })
-}
-
 fn enumerations(interfaces: &[&Interface]) -> Option<Element> {
     let list: Vec<Element> = interfaces
         .iter()
@@ -204,25 +177,4 @@ fn enumerations(interfaces: &[&Interface]) -> Option<Element> {
         })
         .collect();
     (!list.is_empty()).then(|| Element::new("ssd:Enumerations").extend(list))
-}
-
-fn parameter_set(set: &ParameterSet, interface: &Interface) -> Result<Element> {
-    let mut parameters = Element::new("ssv:Parameters");
-    for (name, value) in &set.values {
-        let variable = interface.variable(name)?;
-        ensure!(variable.causality == "parameter", "{name} is no parameter of {}", interface.model_name);
-        let typed = Element::new(&format!("ssv:{}", variable.kind.name()))
-            .with("value", value)
-            .with_some("unit", variable.unit.as_ref());
-        parameters = parameters.child(Element::new("ssv:Parameter").with("name", name).child(typed));
-    }
-    let mut units = units(&[interface]);
-    "ssv:Units".clone_into(&mut units.name);
-    Ok(Element::new("ssv:ParameterSet")
-        .with("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues")
-        .with("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon")
-        .with("version", "1.0")
-        .with("name", set.name)
-        .child(parameters)
-        .child(units))
 }

@@ -15,6 +15,7 @@ use vehicle::{Road, Vehicle};
 use crate::archive::{read_text, write_whole};
 
 use crate::output::{Output, table};
+use crate::parameter_set::ParameterSet;
 use crate::plots::page;
 use crate::recording::{PAPER, Recording, Tracking, tracking_table};
 use crate::workspace::shown;
@@ -31,6 +32,7 @@ Examples:
   cargo fmu simulate --set plant.speed=16 --set controller.horizon=20
   cargo fmu simulate --set plant.noise_scale=1 --csv run.csv --page run.html
   cargo fmu simulate --road my_track.csv                columns s,kappa,v_x [m, 1/m, m/s]
+  cargo fmu simulate --parameters target/tune/tuned.ssv
   cargo fmu simulate --list                             every parameter with its value")]
 pub struct Args {
     /// Manoeuvre (double_lane_change, general) or a CSV file
@@ -45,6 +47,9 @@ pub struct Args {
     /// A parameter, as plant.NAME=VALUE or controller.NAME=VALUE; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
+    /// Parameters from an SSP parameter set (.ssv), such as `cargo fmu tune` writes; --set goes before it
+    #[arg(long, value_name = "FILE")]
+    pub parameters: Option<PathBuf>,
     /// Write every sample to this file: names, units, then numbers
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
@@ -56,9 +61,22 @@ pub struct Args {
     pub list: bool,
 }
 
+impl Args {
+    fn settings(&self) -> Result<Settings> {
+        let mut assignments = Vec::new();
+        if let Some(file) = &self.parameters {
+            let set = ParameterSet::parse(&read_text(file)?).with_context(|| format!("in {}", file.display()))?;
+            assignments = set.assignments().with_context(|| format!("in {}", file.display()))?;
+        }
+        // The last assignment of a name holds: what is typed goes before what is read.
+        assignments.extend_from_slice(&self.set);
+        Settings::new(&self.road, &assignments)
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let settings = Settings::new(&args.road, &args.set)?;
+    let settings = args.settings()?;
     if args.list {
         for line in table(&settings.list()?) {
             output.line(&line);

@@ -21,10 +21,22 @@ impl Settings {
     ///
     /// The plant's preview takes the controller's sample time unless it is set itself: two clocks that differ are a trap.
     pub fn new(road: &str, assignments: &[String]) -> Result<Self> {
-        let mut road = road.to_owned();
-        let mut plant = fields(&vehicle::Parameters::default())?;
-        let mut controller = fields(&lpv_mpc::Parameters::adaptive())?;
-        let mut own_preview = false;
+        let defaults = Self {
+            road: road.to_owned(),
+            plant: vehicle::Parameters::default(),
+            controller: lpv_mpc::Parameters::adaptive(),
+        };
+        defaults.with(assignments)
+    }
+
+    /// These settings with further assignments.
+    ///
+    /// # Errors
+    /// If a name is unknown or a value is not what the parameter takes.
+    pub fn with(self, assignments: &[String]) -> Result<Self> {
+        let Self { mut road, plant, controller } = self;
+        let (mut plant, mut controller) = (fields(&plant)?, fields(&controller)?);
+        let (mut own_preview, mut other_period) = (false, false);
         for assignment in assignments {
             let (name, value) =
                 assignment.split_once('=').with_context(|| format!("expected NAME=VALUE, got {assignment}"))?;
@@ -34,12 +46,15 @@ impl Settings {
                     own_preview |= field == "preview_step";
                     assign(&mut plant, "plant", field, value.trim())?;
                 }
-                Some(("controller", field)) => assign(&mut controller, "controller", field, value.trim())?,
+                Some(("controller", field)) => {
+                    other_period |= field == "t_s";
+                    assign(&mut controller, "controller", field, value.trim())?;
+                }
                 _ => bail!("a name begins with plant. or controller., got {name}"),
             }
         }
         let mut settings = Self { road, plant: read(plant)?, controller: read(controller)? };
-        if !own_preview {
+        if other_period && !own_preview {
             settings.plant.preview_step = settings.controller.t_s;
         }
         Ok(settings)
@@ -116,6 +131,15 @@ mod tests {
         assert_eq!(set(&["controller.t_s=0.05"]).unwrap().plant.preview_step, 0.05);
         let own = set(&["plant.preview_step=0.02", "controller.t_s=0.05"]).unwrap();
         assert_eq!(own.plant.preview_step, 0.02);
+    }
+
+    #[test]
+    fn further_assignments_leave_the_others_alone() {
+        let settings = set(&["plant.speed=16", "plant.preview_step=0.02"]).unwrap();
+        let further = settings.with(&["controller.horizon=12".to_owned()]).unwrap();
+        assert_eq!((further.plant.speed, further.plant.preview_step, further.controller.horizon), (16.0, 0.02, 12));
+        // The clocks of the two sides agree from the start.
+        assert_eq!(set(&[]).unwrap().plant.preview_step, set(&[]).unwrap().controller.t_s);
     }
 
     #[test]
