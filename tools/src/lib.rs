@@ -15,6 +15,7 @@ pub mod parameter_set;
 pub mod plots;
 pub mod recording;
 pub mod report;
+pub mod robustness;
 pub mod simulate;
 pub mod train;
 pub mod tune;
@@ -51,6 +52,7 @@ enum Command {
     Merge(pack::merge::Args),
     Pack(pack::Args),
     Report(report::Args),
+    Robustness(robustness::Args),
     Simulate(simulate::Args),
     Train(Box<train::Args>),
     Tune(Box<tune::Args>),
@@ -67,6 +69,7 @@ impl Cli {
             Command::Merge(args) => pack::merge::run(args, &output),
             Command::Pack(args) => pack::run(args, &output),
             Command::Report(args) => report::run(args, &output),
+            Command::Robustness(args) => robustness::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
             Command::Train(args) => train::run(args, &output),
             Command::Tune(args) => tune::run(args, &output),

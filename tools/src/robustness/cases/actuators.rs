@@ -1,0 +1,44 @@
+//! Slow and late actuators on the lane change, known to the controller and known a little wrong; bad sensors.
+
+use super::{CM, Case, SEEDS, lateral};
+use crate::robustness::scenario::Scenario;
+
+/// Speed of the lane change [m/s].
+const SPEED: f64 = 14.0;
+/// How far the assumed delay is off [s].
+const WRONG: f64 = 0.02;
+
+pub(super) fn cases() -> Vec<Case> {
+    let slow = |assumed: f64| Scenario::lane_change(SPEED).slowed(0.1, 0.05, assumed);
+    let told = || slow(0.05).called("told");
+    let wrong = || [slow(0.05 - WRONG).called("20 ms too short"), slow(0.05 + WRONG).called("20 ms too long")];
+    let noisy = SEEDS.into_iter().flat_map(|seed| {
+        let [short, long] = wrong();
+        [told(), short, long].map(|scenario| {
+            let name = format!("{}, seed {seed}", scenario.name);
+            scenario.with(&[("plant.noise_scale", 1.0), ("plant.seed", seed)]).called(name)
+        })
+    });
+    let bad_sensors = SEEDS
+        .map(|seed| {
+            Scenario::lane_change(SPEED)
+                .with(&[("plant.noise_scale", 3.0), ("plant.seed", seed)])
+                .called(format!("seed {seed}"))
+        })
+        .into();
+    let case =
+        |name, asked, limit, scenarios| Case { name, asked, limit: Some(limit), unit: CM, scenarios, measure: lateral };
+    vec![
+        case("slow_told", "lane change at 14 m/s, lag 0.1 s, delay 50 ms, told", 0.02, vec![told()]),
+        case("slow_wrong", "the same, delay assumed 20 ms wrong", 0.03, wrong().into()),
+        case("slow_noise", "the same, told and wrong, with sensor noise", 0.03, noisy.collect()),
+        case(
+            "very_slow",
+            "lane change at 14 m/s, lag 0.3 s, delay 250 ms, told",
+            0.04,
+            vec![Scenario::lane_change(SPEED).slowed(0.3, 0.25, 0.25).called("told")],
+        ),
+        // No more than ten of the position sensor's deviations: the car must not be lost to what it does not know.
+        case("bad_sensors", "sensor noise three times what is assumed, at 14 m/s", 0.3, bad_sensors),
+    ]
+}
