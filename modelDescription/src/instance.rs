@@ -172,7 +172,7 @@ impl<M: Model, L: Log> Instance<M, L> {
     }
 
     #[inline]
-    fn is_settable(&self, row: &Row<M>) -> bool {
+    pub fn is_settable(&self, row: &Row<M>) -> bool {
         match row.role {
             Role::Input | Role::Tunable => true,
             Role::Parameter => self.state.phase != Phase::StepComplete,
@@ -181,7 +181,7 @@ impl<M: Model, L: Log> Instance<M, L> {
     }
 
     #[cold]
-    fn frozen_error(&self, row: &Row<M>, element: usize) -> Error {
+    pub fn frozen_error(&self, row: &Row<M>, element: usize) -> Error {
         let reason = if row.role.is_calculated() {
             "it is calculated"
         } else {

@@ -84,7 +84,9 @@ mod guid;
 mod instance;
 mod lifecycle;
 mod model;
+mod place;
 mod range;
+mod reals;
 mod resources;
 mod state;
 #[doc(hidden)]

@@ -8,9 +8,8 @@ impl<M> Row<M> {
     #[inline]
     #[must_use]
     pub fn permits(&self, value: Scalar<'_>) -> bool {
-        let within = |value: f64| {
-            value.is_finite() && self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max)
-        };
+        let (min, max) = self.limits();
+        let within = |value: f64| value >= min && value <= max;
         match value {
             Scalar::Real(value) => within(value),
             Scalar::Integer(value) => match self.items {
@@ -19,6 +18,13 @@ impl<M> Row<M> {
             },
             Scalar::Boolean(_) | Scalar::String(_) => true,
         }
+    }
+
+    /// Smallest and largest permitted number: every finite one where nothing is declared.
+    #[inline]
+    #[must_use]
+    pub fn limits(&self) -> (f64, f64) {
+        (self.min.unwrap_or(f64::MIN), self.max.unwrap_or(f64::MAX))
     }
 
     /// The permitted values, for messages.

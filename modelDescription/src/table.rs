@@ -5,6 +5,7 @@
 use std::sync::OnceLock;
 
 use crate::guid;
+pub use crate::place::{Place, count, flatten};
 use crate::value::{Kind, Scalar, Value};
 
 /// Causality and variability of a row.
@@ -57,6 +58,11 @@ pub type Get<M> = fn(&M, usize) -> Scalar<'_>;
 /// How the interface writes an element of a variable; false if the value does not fit.
 pub type Set<M> = fn(&mut M, usize, Scalar<'_>) -> bool;
 
+/// How the interface reads consecutive elements of a Real variable.
+pub type GetReals<M> = fn(&M, usize, &mut [f64]);
+/// How the interface writes consecutive elements of a Real variable.
+pub type SetReals<M> = fn(&mut M, usize, &[f64]);
+
 /// One declaration: a scalar variable, or an array whose elements become variables.
 pub struct Row<M> {
     /// Name without the index.
@@ -91,6 +97,8 @@ pub struct Row<M> {
     pub terminal: Option<&'static str>,
     pub(crate) get: Get<M>,
     pub(crate) set: Option<Set<M>>,
+    pub(crate) get_reals: GetReals<M>,
+    pub(crate) set_reals: Option<SetReals<M>>,
 }
 
 impl<M> Row<M> {
@@ -98,18 +106,18 @@ impl<M> Row<M> {
     pub const fn field<T: Value>(
         declared: (Role, &'static str, Option<usize>, &'static str, &'static str),
         _witness: fn(&M, usize) -> &T,
-        get: Get<M>,
-        set: Set<M>,
+        (get, get_reals): (Get<M>, GetReals<M>),
+        (set, set_reals): (Set<M>, SetReals<M>),
     ) -> Self {
-        Self::new(declared, T::KIND, get, Some(set))
+        Self::new(declared, T::KIND, (get, get_reals), Some((set, set_reals)))
     }
 
     #[doc(hidden)]
     pub const fn computed<T: Value>(
         declared: (Role, &'static str, Option<usize>, &'static str, &'static str),
         _witness: fn(&M, usize) -> T,
-        get: Get<M>,
-        set: Option<Set<M>>,
+        get: (Get<M>, GetReals<M>),
+        set: Option<(Set<M>, SetReals<M>)>,
     ) -> Self {
         Self::new(declared, T::KIND, get, set)
     }
@@ -117,9 +125,14 @@ impl<M> Row<M> {
     const fn new(
         (role, name, len, unit, description): (Role, &'static str, Option<usize>, &'static str, &'static str),
         kind: Kind,
-        get: Get<M>,
-        set: Option<Set<M>>,
+        (get, get_reals): (Get<M>, GetReals<M>),
+        set: Option<(Set<M>, SetReals<M>)>,
     ) -> Self {
+        // `Option::unzip` is not a constant function.
+        let (set, set_reals) = match set {
+            Some((set, set_reals)) => (Some(set), Some(set_reals)),
+            None => (None, None),
+        };
         Self {
             name,
             role,
@@ -138,6 +151,8 @@ impl<M> Row<M> {
             terminal: None,
             get,
             set,
+            get_reals,
+            set_reals,
         }
     }
 
@@ -194,13 +209,6 @@ impl<M> Row<M> {
         self.lazy = lazy;
         self
     }
-}
-
-/// Where a value reference points: a row and an element of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    row: u16,
-    element: u16,
 }
 
 /// All variables of a model; a value reference is the position among the flattened rows.
@@ -264,41 +272,5 @@ impl<M> Row<M> {
     #[must_use]
     pub fn read<'a>(&self, model: &'a M, element: usize) -> Scalar<'a> {
         (self.get)(model, element)
-    }
-}
-
-#[doc(hidden)]
-pub const fn count<M>(rows: &[Row<M>]) -> usize {
-    let mut total = 0;
-    let mut row = 0;
-    while row < rows.len() {
-        total += elements(&rows[row]);
-        row += 1;
-    }
-    total
-}
-
-#[doc(hidden)]
-#[expect(clippy::cast_possible_truncation, reason = "both counts are compared with u16::MAX first")]
-pub const fn flatten<M, const LEN: usize>(rows: &[Row<M>]) -> [Place; LEN] {
-    assert!(LEN <= u16::MAX as usize, "a table holds at most 65535 variables");
-    let mut places = [Place { row: 0, element: 0 }; LEN];
-    let (mut next, mut row) = (0, 0);
-    while row < rows.len() {
-        let mut element = 0;
-        while element < elements(&rows[row]) {
-            places[next] = Place { row: row as u16, element: element as u16 };
-            next += 1;
-            element += 1;
-        }
-        row += 1;
-    }
-    places
-}
-
-const fn elements<M>(row: &Row<M>) -> usize {
-    match row.len {
-        None => 1,
-        Some(len) => len,
     }
 }

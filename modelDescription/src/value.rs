@@ -13,6 +13,19 @@ pub enum Scalar<'a> {
     String(&'a str),
 }
 
+impl Scalar<'_> {
+    /// The number of a Real; rows of another type are never asked for it.
+    #[doc(hidden)]
+    #[inline]
+    #[must_use]
+    pub fn real(self) -> f64 {
+        match self {
+            Scalar::Real(value) => value,
+            _ => 0.0,
+        }
+    }
+}
+
 /// Which of the four types a variable has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -65,10 +78,12 @@ impl<T: Value + Default> FromScalar for T {
 impl Value for f64 {
     const KIND: Kind = Kind::Real;
 
+    #[inline]
     fn to_scalar(&self) -> Scalar<'_> {
         Scalar::Real(*self)
     }
 
+    #[inline]
     fn assign(&mut self, value: Scalar<'_>) -> bool {
         let Scalar::Real(value) = value else { return false };
         *self = value;

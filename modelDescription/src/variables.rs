@@ -71,8 +71,22 @@ macro_rules! variables {
         $crate::Row::field(
             ($crate::Role::$role, stringify!($name), $len, $unit, $description),
             |$m: &$model, $k: usize| &$place,
-            |$m: &$model, $k: usize| $crate::Value::to_scalar(&$place),
-            |$m: &mut $model, $k: usize, value: $crate::Scalar<'_>| $crate::Value::assign(&mut $place, value),
+            (
+                |$m: &$model, $k: usize| $crate::Value::to_scalar(&$place),
+                |$m: &$model, first: usize, values: &mut [f64]| {
+                    for ($k, value) in (first..).zip(values) {
+                        *value = $crate::Value::to_scalar(&$place).real();
+                    }
+                },
+            ),
+            (
+                |$m: &mut $model, $k: usize, value: $crate::Scalar<'_>| $crate::Value::assign(&mut $place, value),
+                |$m: &mut $model, first: usize, values: &[f64]| {
+                    for ($k, &value) in (first..).zip(values) {
+                        $crate::Value::assign(&mut $place, $crate::Scalar::Real(value));
+                    }
+                },
+            ),
         )
     };
 
@@ -81,7 +95,14 @@ macro_rules! variables {
         $crate::Row::computed(
             ($crate::Role::$role, stringify!($name), $len, $unit, $description),
             |$m: &$model, $k: usize| $get,
-            |$m: &$model, $k: usize| $crate::Scalar::from($get),
+            (
+                |$m: &$model, $k: usize| $crate::Scalar::from($get),
+                |$m: &$model, first: usize, values: &mut [f64]| {
+                    for ($k, value) in (first..).zip(values) {
+                        *value = $crate::Scalar::from($get).real();
+                    }
+                },
+            ),
             None,
         )
     };
@@ -90,12 +111,28 @@ macro_rules! variables {
         $crate::Row::computed(
             ($crate::Role::$role, stringify!($name), $len, $unit, $description),
             |$m: &$model, $k: usize| $get,
-            |$m: &$model, $k: usize| $crate::Scalar::from($get),
-            Some(|$n: &mut $model, $l: usize, value: $crate::Scalar<'_>| {
-                let Some($v) = <$t as $crate::FromScalar>::from_scalar(value) else { return false };
-                $set;
-                true
-            }),
+            (
+                |$m: &$model, $k: usize| $crate::Scalar::from($get),
+                |$m: &$model, first: usize, values: &mut [f64]| {
+                    for ($k, value) in (first..).zip(values) {
+                        *value = $crate::Scalar::from($get).real();
+                    }
+                },
+            ),
+            Some((
+                |$n: &mut $model, $l: usize, value: $crate::Scalar<'_>| {
+                    let Some($v) = <$t as $crate::FromScalar>::from_scalar(value) else { return false };
+                    $set;
+                    true
+                },
+                |$n: &mut $model, first: usize, values: &[f64]| {
+                    for ($l, &value) in (first..).zip(values) {
+                        if let Some($v) = <$t as $crate::FromScalar>::from_scalar($crate::Scalar::Real(value)) {
+                            $set;
+                        }
+                    }
+                },
+            )),
         )
     };
 }

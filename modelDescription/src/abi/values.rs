@@ -8,7 +8,32 @@ use crate::lifecycle as of;
 use crate::model::Model;
 use crate::value::{Kind, Scalar};
 
-/// The getters and setters of the three types that travel as plain numbers.
+pub unsafe fn get_real<M: Model>(component: Component, vr: *const ValueReference, n: usize, value: *mut f64) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::GET_REAL, |slave| {
+            slave.read_reals(input("vr", vr, n)?, output("value", value, n)?)?;
+            Ok(Status::Ok)
+        })
+    }
+}
+
+pub unsafe fn set_real<M: Model>(
+    component: Component,
+    vr: *const ValueReference,
+    n: usize,
+    value: *const f64,
+) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        call::<M>(component, &of::SET_REAL, |slave| {
+            slave.write_reals(input("vr", vr, n)?, input("value", value, n)?)?;
+            Ok(Status::Ok)
+        })
+    }
+}
+
+/// The getters and setters of the two other types that travel as plain numbers.
 macro_rules! numbers {
     ($($get:ident $set:ident $get_row:ident $set_row:ident $kind:ident $type:ty, $out:expr, $in:expr;)*) => {$(
         #[inline]
@@ -42,9 +67,8 @@ macro_rules! numbers {
 }
 
 numbers! {
-    get_real    set_real    GET_REAL    SET_REAL    Real    f64,     |value| value,                |value| value;
-    get_integer set_integer GET_INTEGER SET_INTEGER Integer Integer, |value| value,                |value| value;
-    get_boolean set_boolean GET_BOOLEAN SET_BOOLEAN Boolean Boolean, Boolean::from,   |value| value != FALSE;
+    get_integer set_integer GET_INTEGER SET_INTEGER Integer Integer, |value| value, |value| value;
+    get_boolean set_boolean GET_BOOLEAN SET_BOOLEAN Boolean Boolean, Boolean::from, |value| value != FALSE;
 }
 
 pub unsafe fn get_string<M: Model>(

@@ -240,3 +240,41 @@ fn input_derivatives_are_set_all_or_none() {
     slave.step(0.0, 1.0);
     assert_eq!(slave.get(vr("y")), Ok(0.0), "the derivative of u was not taken over");
 }
+
+#[test]
+fn values_do_not_depend_on_how_the_references_are_grouped() {
+    // Runs that begin and end inside an array, cross from row to row, go backwards, repeat.
+    let groups: [&[&str]; 6] = [
+        &["u", "weights[1]", "weights[2]", "weights[3]", "gain"],
+        &["weights[2]", "weights[3]"],
+        &["weights[3]", "weights[2]", "weights[1]"],
+        &["weights[1]", "weights[3]", "u"],
+        &["weights[1]", "weights[1]", "weights[2]"],
+        &[],
+    ];
+    for group in groups {
+        let (slave, single) = (Slave::started(&guid(), 0.0), Slave::started(&guid(), 0.0));
+        let references: Vec<_> = group.iter().map(|name| vr(name)).collect();
+        let values: Vec<f64> = (0..).map(|k| 0.5 + f64::from(k)).take(group.len()).collect();
+        let count = references.len();
+        assert_eq!(unsafe { fmi2SetReal(slave.component, references.as_ptr(), count, values.as_ptr()) }, OK);
+        for (reference, value) in references.iter().zip(&values) {
+            assert_eq!(single.set(*reference, *value), OK);
+        }
+        let mut together = vec![0.0; count];
+        assert_eq!(unsafe { fmi2GetReal(slave.component, references.as_ptr(), count, together.as_mut_ptr()) }, OK);
+        let one_by_one: Vec<f64> = references.iter().map(|reference| single.get(*reference).unwrap()).collect();
+        assert_eq!(together, one_by_one, "{group:?}");
+    }
+}
+
+#[test]
+fn a_value_out_of_range_inside_a_run_is_named() {
+    let mut slave = Slave::started(&guid(), 0.0);
+    let references = [vr("weights[1]"), vr("weights[2]"), vr("weights[3]")];
+    let values = [1.0, 2.0, f64::INFINITY];
+    assert_eq!(unsafe { fmi2SetReal(slave.component, references.as_ptr(), 3, values.as_ptr()) }, ERROR);
+    let message = slave.error();
+    assert!(message.contains("weights[3]") && message.contains("inf"), "{message}");
+    assert_eq!(slave.get(vr("weights[1]")), Ok(1.0));
+}
