@@ -2,7 +2,7 @@
 
 use lpv_mpc::parameters::HORIZON_MAX;
 use lpv_mpc::preview::PREVIEW;
-use lpv_mpc::{Adaptation, Backend, Estimation, Inputs, Status};
+use lpv_mpc::{Adaptation, Backend, Estimation, Inputs, Status, TerminalCost};
 use model_description::{Enumeration, Item, Scalar, Table, variables};
 
 use crate::LpvMpcController;
@@ -70,6 +70,23 @@ const BACKEND: Enumeration = Enumeration {
             value: Backend::Clarabel as i32,
             name: "clarabel",
             description: "A general conic solver, slower by two orders of magnitude",
+        },
+    ],
+};
+
+const TERMINAL_COST: Enumeration = Enumeration {
+    name: "TerminalCost",
+    description: "What the state at the end of the horizon costs",
+    items: &[
+        Item {
+            value: TerminalCost::StageWeights as i32,
+            name: "stage_weights",
+            description: "The weights of the stages, as in the paper",
+        },
+        Item {
+            value: TerminalCost::Riccati as i32,
+            name: "riccati",
+            description: "What driving on without end costs, by the Riccati equation; for short horizons",
         },
     ],
 };
@@ -184,7 +201,7 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Tunable q_e_psi ["1/rad2"] "Weight on the heading error", min 0.0, max 1e12 => parameters.q_e_psi;
         Tunable r_delta ["1/rad2"] "Weight on the steering increment per period", min 1e-12, max 1e12 => parameters.r_delta;
         Tunable r_a_x ["s4/m2"] "Weight on the acceleration increment per period", min 1e-12, max 1e12 => parameters.r_a_x;
-        Tunable terminal_factor ["1"] "Factor of the stage weights in the terminal cost", min 0.0, max 1e6 => parameters.terminal_factor;
+        Tunable terminal_factor ["1"] "Factor of the terminal cost", min 0.0, max 1e6 => parameters.terminal_factor;
         Tunable delta_max ["rad"] "Largest steering angle", min 1e-3, max 1.5 => parameters.delta_max;
         Tunable delta_rate_max ["rad/s"] "Largest steering rate", min 1e-3, max 100.0 => parameters.delta_rate_max;
         Tunable a_x_min ["m/s2"] "Strongest braking, negative", min -50.0, max -0.01 => parameters.a_x_min;
@@ -207,6 +224,8 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Parameter network_file "File of the network's weights, a path or file URI, relative to the resources; empty: the built-in network" => network_file;
         Output confidence ["1"] "How far the network is believed: 0 the nominal stiffnesses, 1 the network's", min 0.0, max 1.0 => { get |m| m.output.confidence };
         Input mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times; 0: unknown, mu holds", terminal "preview", min 0.0, max 5.0 => inputs.mu_ref;
+        Parameter terminal_cost "What the state at the end of the horizon costs, before terminal_factor", items &TERMINAL_COST
+            => { get |m| m.parameters.terminal_cost as i32, set |m, v: i32| m.parameters.terminal_cost = terminal_cost(v) };
         Tunable mu ["1"] "Friction of the road where mu_ref does not tell it", min 0.01, max 5.0 => parameters.mu;
         Tunable grip_max ["1"] "Share of the grip that the planned speed may use; 0: the wanted speed is planned whatever it takes", min 0.0, max 2.0 => parameters.grip_max;
     }
@@ -218,6 +237,11 @@ fn adaptation(value: i32) -> Adaptation {
         .into_iter()
         .find(|mode| *mode as i32 == value)
         .unwrap_or(Adaptation::Constant)
+}
+
+/// The table lets only values of the enumeration through.
+fn terminal_cost(value: i32) -> TerminalCost {
+    if value == TerminalCost::Riccati as i32 { TerminalCost::Riccati } else { TerminalCost::StageWeights }
 }
 
 /// The table lets only values of the enumeration through.

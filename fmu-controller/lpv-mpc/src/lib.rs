@@ -14,6 +14,8 @@
 //! - \[Kebbati\] Y. Kebbati, N. Ait-Oufroukh, D. Ichalal, V. Vigneron, "RNN-based linear parameter varying adaptive model
 //!   predictive control for autonomous driving". Its printed equations contain errors; where the code differs, the doc
 //!   comment says so.
+//! - \[Chu\] E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, "Structure-preserving algorithms for periodic discrete-time
+//!   algebraic Riccati equations", International Journal of Control 77 (2004).
 //! - \[Rajamani\] R. Rajamani, "Vehicle Dynamics and Control", 2nd ed., Springer 2012: steady-state cornering, section 3.3.
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
@@ -38,10 +40,11 @@ mod recovery;
 mod scalar;
 mod sensitivity;
 pub mod signals;
+mod terminal;
 
 pub use controller::Controller;
 pub use error::Error;
 pub use ladder::Status;
-pub use parameters::{Adaptation, Backend, Estimation, Parameters};
+pub use parameters::{Adaptation, Backend, Estimation, Parameters, TerminalCost};
 pub use scalar::Scalar;
 pub use signals::{Inputs, Output};

@@ -9,13 +9,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::discretise::Hold;
-use crate::guide::Guide;
+use crate::guide::{Guide, Path};
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
-use crate::parameters::Backend;
+use crate::model::{
+    Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, progress,
+};
+use crate::parameters::{Backend, TerminalCost};
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
 use crate::recovery::Recovery;
+use crate::terminal::riccati;
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
 /// change: the third changes the first command by less than 1e-3 of its bound.
@@ -32,6 +35,9 @@ const STANDSTILL: f64 = 0.2;
 
 /// Stages in which a car that is to stand does not drive away [1]: with the default rate of steering 0.1 rad are turned meanwhile.
 const NEAR: usize = 4;
+
+/// Relative change of the speed up to which the weight of the last state stays [1].
+const SAME_SPEED: f64 = 0.02;
 
 /// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
 const CLARABEL_TOLERANCE: f64 = 1e-10;
@@ -99,6 +105,15 @@ impl<const N_X: usize> Plan<N_X> {
     }
 }
 
+/// How the last state is weighed.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Terminal {
+    cost: TerminalCost,
+    factor: f64,
+    /// Speed that the weight in force was made for [m/s]; 0 if none was.
+    v_x: f64,
+}
+
 /// Model predictive controller over states of dimension `N_X`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mpc<const N_X: usize> {
@@ -111,6 +126,7 @@ pub struct Mpc<const N_X: usize> {
     backend: Backend,
     /// Bound on the lateral error near the path [m].
     soft_bound: f64,
+    terminal: Terminal,
     /// Largest change of the steering per period [rad].
     steering_step: f64,
     /// Fastest speed that the last plan had to follow at first [m/s].
@@ -136,6 +152,7 @@ impl<const N_X: usize> Mpc<N_X> {
             clarabel: clarabel(),
             backend: p.backend,
             soft_bound: p.e_y_max,
+            terminal: Terminal { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 },
             steering_step: p.delta_rate_max * p.t_s,
             fastest: f64::INFINITY,
             plan: Plan::none(p.horizon),
@@ -157,6 +174,7 @@ impl<const N_X: usize> Mpc<N_X> {
         problem.q[E_Y] = p.q_e_y;
         problem.q[E_PSI] = p.q_e_psi;
         problem.q_terminal = SMatrix::from_diagonal(&(problem.q * p.terminal_factor));
+        self.terminal = Terminal { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 };
         problem.r = Input::from([p.r_delta, p.r_a_x]);
         problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
         problem.u_max = Input::from([p.delta_max, p.a_x_max]);
@@ -194,6 +212,7 @@ impl<const N_X: usize> Mpc<N_X> {
         let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
         self.problem.du_max[DELTA] = if stands { 0.0 } else { self.steering_step };
         self.problem.soft_bound = self.soft_bound + recovery.map_or(0.0, |recovery| recovery.room);
+        self.weigh_the_end(&tyres.nominal(), hold, body);
         let passes = if continues { 1 } else { FIRST_PASSES };
         for _ in 0..passes {
             self.plan.x[0] = self.problem.x_0;
@@ -230,6 +249,27 @@ impl<const N_X: usize> Mpc<N_X> {
             pace = path.v_x;
             *x = steady_state(path.v_x, path.kappa[1], body, tyres);
             *u = Input::from([(body.l_f + body.l_r) * path.kappa[0], 0.0]);
+        }
+    }
+
+    /// Weighs the last state by the speed that the schedule ends with.
+    ///
+    /// That speed is the last plan's, so the weight does not depend on the measurement.
+    fn weigh_the_end(&mut self, tyres: &Tyres, hold: &Hold, body: &Body) {
+        let Self { terminal, plan, problem, .. } = self;
+        let v_x = plan.x[plan.x.len() - 1][V_X].max(V_GUARD);
+        if terminal.cost == TerminalCost::StageWeights || (v_x - terminal.v_x).abs() <= SAME_SPEED * terminal.v_x {
+            return;
+        }
+        let straight = Path { kappa: [0.0; 2], mu: 1.0, v_x };
+        let around = Surroundings { body, nominal: *tyres, hold, disturbance: Disturbance::zeros() };
+        let mut x = State::zeros();
+        x[V_X] = v_x;
+        let end = linearise::<f64, N_X>(&(x, Input::zeros()), &straight, tyres, &around);
+        // Without a solution the weight of before stays; its speed was not far.
+        if let Some(weight) = riccati(&end.A, &end.B, &problem.q, &problem.r) {
+            problem.q_terminal = weight * terminal.factor;
+            terminal.v_x = v_x;
         }
     }
 

@@ -46,6 +46,17 @@ pub enum Backend {
     Clarabel,
 }
 
+/// What the state at the end of the horizon costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TerminalCost {
+    /// The stage's weights times `terminal_factor`, as in the paper.
+    #[default]
+    StageWeights,
+    /// What driving on costs, by the Riccati equation, times `terminal_factor`.
+    Riccati,
+}
+
 /// Parameters of the controller, named as in the public interface.
 ///
 /// [`Default`] is a tuning that survives delay, lag and noise; [`Parameters::paper`] is the paper's.
@@ -96,7 +107,9 @@ pub struct Parameters {
     pub r_delta: f64,
     /// Weight on the acceleration increment per period [s4/m2].
     pub r_a_x: f64,
-    /// Factor of the stage weights in the terminal cost [1].
+    /// What the state at the end of the horizon costs.
+    pub terminal_cost: TerminalCost,
+    /// Factor of the terminal cost [1].
     pub terminal_factor: f64,
     /// Largest steering angle [rad].
     pub delta_max: f64,
@@ -180,6 +193,7 @@ impl Parameters {
             q_e_psi: 1e-3,
             r_delta: 0.003,
             r_a_x: 1e-4,
+            terminal_cost: TerminalCost::StageWeights,
             terminal_factor: 1.0,
             // Not in the paper: a passenger car's rolling resistance on asphalt, [Rajamani, section 4.1.4].
             c_rr: 0.015,
@@ -337,7 +351,8 @@ mod tests {
             q_e_psi r_delta r_a_x terminal_factor delta_max delta_rate_max a_x_min a_x_max a_x_rate_max e_y_max
             e_y_penalty input_delay tau_delta tau_a_x sensor_noise);
         assert!(
-            is_real || ["horizon", "adaptation", "backend", "estimation", "v_y_measured"].contains(&name),
+            is_real
+                || ["horizon", "terminal_cost", "adaptation", "backend", "estimation", "v_y_measured"].contains(&name),
             "{name} is not covered"
         );
         is_real

@@ -5,7 +5,7 @@
 use lpv_mpc::estimator::SENSOR_DEVIATION;
 use lpv_mpc::model::{A_X, DELTA, Disturbance, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE, derivative};
 use lpv_mpc::preview::Preview;
-use lpv_mpc::{Controller, Estimation, Inputs, Parameters, Status};
+use lpv_mpc::{Controller, Estimation, Inputs, Parameters, Status, TerminalCost};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -119,6 +119,18 @@ fn a_known_car_stays_on_the_path_at_every_communication_step() {
 fn the_papers_tuning_follows_more_closely_in_the_ideal_loop() {
     let worst = Loop::new(Parameters::paper(), slalom).worst_e_y(10.0, 0.0);
     assert!(worst < 0.003, "{worst} m");
+}
+
+#[test]
+fn a_terminal_cost_from_the_riccati_equation_replaces_horizon() {
+    // 0.13 s of preview.
+    let worst = |terminal_cost| {
+        Loop::new(Parameters { horizon: 4, terminal_cost, ..Parameters::default() }, slalom).worst_e_y(10.0, 2.0)
+    };
+    let (riccati, weights) = (worst(TerminalCost::Riccati), worst(TerminalCost::StageWeights));
+    // What forty periods of horizon leave is 0.4 mm.
+    assert!(riccati < 0.005, "{riccati} m");
+    assert!(weights > 1.0, "the stage weights would do: {weights} m");
 }
 
 #[test]
