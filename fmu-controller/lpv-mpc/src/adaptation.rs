@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use crate::Parameters;
 use crate::jordan::{Belief, Document, Measured, Memory, Network};
 use crate::model::{A_X, Body, DELTA, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, slip_angles};
+use crate::modes::Adaptation;
 use crate::mpc::TyreModel;
-use crate::parameters::Adaptation;
 
 /// Smallest tangent stiffness, as a share of the secant one [1].
 ///

@@ -9,35 +9,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::discretise::Hold;
-use crate::guide::{Guide, Path};
+use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{
-    Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, progress,
-};
-use crate::parameters::{Backend, TerminalCost};
+use crate::model::{Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
+use crate::modes::Backend;
+use crate::plan::Plan;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
 use crate::recovery::Recovery;
-use crate::terminal::riccati;
+use crate::terminal::Terminal;
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
 /// change: the third changes the first command by less than 1e-3 of its bound.
 const FIRST_PASSES: usize = 3;
-
-/// Change of the planned steering from one sample to the next at which half of the new plan is scheduled [rad].
-///
-/// Where tyres saturate, or far off the path, the plan may alternate between two that contradict each other, each made around
-/// the other; smaller changes are the ordinary ones.
-const DAMPED: f64 = 0.01;
 
 /// Speed below which a car that is to stand holds its steering [m/s]: there sensor noise is larger than what steering corrects.
 const STANDSTILL: f64 = 0.2;
 
 /// Stages in which a car that is to stand does not drive away [1]: with the default rate of steering 0.1 rad are turned meanwhile.
 const NEAR: usize = 4;
-
-/// Relative change of the speed up to which the weight of the last state stays [1].
-const SAME_SPEED: f64 = 0.02;
 
 /// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
 const CLARABEL_TOLERANCE: f64 = 1e-10;
@@ -63,55 +53,6 @@ impl TyreModel for Tyres {
     fn at(&mut self, _x: &State, _u: &Input, _mu: f64) -> Tyres {
         *self
     }
-}
-
-/// A plan that may be executed: predicted states and commands, and how many samples ago it was made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Plan<const N_X: usize> {
-    /// States, from the moment the first command acts to the end of the horizon.
-    pub x: Vec<SVector<f64, N_X>>, // N + 1
-    /// Commands.
-    pub u: Vec<Input>, // N
-    /// Samples since the plan was optimal; beyond the horizon nothing of it is left.
-    pub age: usize,
-}
-
-impl<const N_X: usize> Plan<N_X> {
-    fn none(horizon: usize) -> Self {
-        Self { x: vec![SVector::zeros(); horizon + 1], u: vec![Input::zeros(); horizon], age: horizon }
-    }
-
-    /// Whether something of the plan is left to execute.
-    pub fn is_left(&self) -> bool {
-        self.age < self.u.len()
-    }
-
-    /// Nothing of it is left any more.
-    fn forget(&mut self) {
-        self.age = self.u.len();
-    }
-
-    /// Moves on by one sample; the end is repeated.
-    pub fn shift(&mut self) {
-        self.x.rotate_left(1);
-        self.u.rotate_left(1);
-        if let [.., before, last] = &mut self.x[..] {
-            *last = *before;
-        }
-        if let [.., before, last] = &mut self.u[..] {
-            *last = *before;
-        }
-        self.age += 1;
-    }
-}
-
-/// How the last state is weighed.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct Terminal {
-    cost: TerminalCost,
-    factor: f64,
-    /// Speed that the weight in force was made for [m/s]; 0 if none was.
-    v_x: f64,
 }
 
 /// Model predictive controller over states of dimension `N_X`.
@@ -152,7 +93,7 @@ impl<const N_X: usize> Mpc<N_X> {
             clarabel: clarabel(),
             backend: p.backend,
             soft_bound: p.e_y_max,
-            terminal: Terminal { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 },
+            terminal: Terminal::new(p),
             steering_step: p.delta_rate_max * p.t_s,
             fastest: f64::INFINITY,
             plan: Plan::none(p.horizon),
@@ -174,7 +115,7 @@ impl<const N_X: usize> Mpc<N_X> {
         problem.q[E_Y] = p.q_e_y;
         problem.q[E_PSI] = p.q_e_psi;
         problem.q_terminal = SMatrix::from_diagonal(&(problem.q * p.terminal_factor));
-        self.terminal = Terminal { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 };
+        self.terminal = Terminal::new(p);
         problem.r = Input::from([p.r_delta, p.r_a_x]);
         problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
         problem.u_max = Input::from([p.delta_max, p.a_x_max]);
@@ -212,7 +153,8 @@ impl<const N_X: usize> Mpc<N_X> {
         let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
         self.problem.du_max[DELTA] = if stands { 0.0 } else { self.steering_step };
         self.problem.soft_bound = self.soft_bound + recovery.map_or(0.0, |recovery| recovery.room);
-        self.weigh_the_end(&tyres.nominal(), hold, body);
+        let speed = self.plan.x[self.plan.x.len() - 1][V_X];
+        self.terminal.weigh(&mut self.problem, speed, &tyres.nominal(), hold, body);
         let passes = if continues { 1 } else { FIRST_PASSES };
         for _ in 0..passes {
             self.plan.x[0] = self.problem.x_0;
@@ -252,44 +194,6 @@ impl<const N_X: usize> Mpc<N_X> {
         }
     }
 
-    /// Weighs the last state by the speed that the schedule ends with.
-    ///
-    /// That speed is the last plan's, so the weight does not depend on the measurement.
-    fn weigh_the_end(&mut self, tyres: &Tyres, hold: &Hold, body: &Body) {
-        let Self { terminal, plan, problem, .. } = self;
-        let v_x = plan.x[plan.x.len() - 1][V_X].max(V_GUARD);
-        if terminal.cost == TerminalCost::StageWeights || (v_x - terminal.v_x).abs() <= SAME_SPEED * terminal.v_x {
-            return;
-        }
-        let straight = Path { kappa: [0.0; 2], mu: 1.0, v_x };
-        let around = Surroundings { body, nominal: *tyres, hold, disturbance: Disturbance::zeros() };
-        let mut x = State::zeros();
-        x[V_X] = v_x;
-        let end = linearise::<f64, N_X>(&(x, Input::zeros()), &straight, tyres, &around);
-        // Without a solution the weight of before stays; its speed was not far.
-        if let Some(weight) = riccati(&end.A, &end.B, &problem.q, &problem.r) {
-            problem.q_terminal = weight * terminal.factor;
-            terminal.v_x = v_x;
-        }
-    }
-
-    /// Takes the plan for the schedule, and less of it the more its steering differs from the one before.
-    fn reschedule(&mut self) {
-        let Self { plan, schedule, .. } = self;
-        let steering = plan.u.iter().zip(&schedule.u).map(|(planned, scheduled)| (planned - scheduled)[DELTA].abs());
-        let share = if schedule.is_left() { (1.0 + steering.fold(0.0, f64::max) / DAMPED).recip() } else { 1.0 };
-        // Written so that all of the plan is the plan, to the last bit and whatever was scheduled before.
-        let mix = |before: f64, planned: f64| if share < 1.0 { before + share * (planned - before) } else { planned };
-        for (scheduled, planned) in schedule.x.iter_mut().zip(&plan.x) {
-            scheduled.zip_apply(planned, |scheduled, planned| *scheduled = mix(*scheduled, planned));
-        }
-        for (scheduled, planned) in schedule.u.iter_mut().zip(&plan.u) {
-            scheduled.zip_apply(planned, |scheduled, planned| *scheduled = mix(*scheduled, planned));
-        }
-        schedule.x[0] = plan.x[0];
-        schedule.age = 0;
-    }
-
     /// Fills the stages of the quadratic programme along the schedule.
     fn model(
         &mut self,
@@ -302,7 +206,7 @@ impl<const N_X: usize> Mpc<N_X> {
         let around = Surroundings { body, nominal: tyres.nominal(), hold, disturbance: *disturbance };
         tyres.restart();
         self.fastest = 0.0;
-        self.reschedule();
+        self.schedule.take(&self.plan);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
             let path = guide.advance(|kappa| progress(&at.0, kappa));

@@ -17,8 +17,9 @@ use crate::horizon::{Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y, progress};
+use crate::modes::Estimation;
 use crate::mpc::{Mpc, TyreModel};
-use crate::parameters::{Estimation, HORIZON_MAX};
+use crate::parameters::HORIZON_MAX;
 use crate::qp::{Perturbation, Stage};
 use crate::{Inputs, Output, Parameters};
 

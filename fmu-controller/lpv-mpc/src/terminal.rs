@@ -5,8 +5,15 @@
 //! equation of the prediction model on a straight at the speed that the plan ends with.
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
-use crate::model::NU;
+use crate::discretise::Hold;
+use crate::guide::Path;
+use crate::horizon::{Surroundings, linearise};
+use crate::model::{Body, Disturbance, Input, NU, State, Tyres, V_GUARD, V_X};
+use crate::modes::TerminalCost;
+use crate::parameters::Parameters;
+use crate::qp::Problem;
 
 /// States with the actuators, and the command that acts: the increments of the command are what the cost counts.
 const NZ: usize = crate::horizon::NX_LAGS + NU;
@@ -19,11 +26,56 @@ const DOUBLINGS: usize = 30;
 /// Relative change that counts as none [1]; the doubling converges quadratically, so the next one is at rounding.
 const CONVERGED: f64 = 1e-9;
 
+/// Relative change of the speed up to which the weight of the last state stays [1].
+const SAME_SPEED: f64 = 0.02;
+
+/// How the last state is weighed.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Terminal {
+    cost: TerminalCost,
+    factor: f64,
+    /// Speed that the weight in force was made for [m/s]; 0 if none was.
+    v_x: f64,
+}
+
+impl Terminal {
+    /// Of these parameters, to be weighed.
+    pub fn new(p: &Parameters) -> Self {
+        Self { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 }
+    }
+
+    /// Weighs the last state by the speed `v_x` [m/s] that the last plan ends with, so that the weight does not depend on the
+    /// measurement.
+    pub fn weigh<const N_X: usize>(
+        &mut self,
+        problem: &mut Problem<N_X, NU>,
+        v_x: f64,
+        tyres: &Tyres,
+        hold: &Hold,
+        body: &Body,
+    ) {
+        let v_x = v_x.max(V_GUARD);
+        if self.cost == TerminalCost::StageWeights || (v_x - self.v_x).abs() <= SAME_SPEED * self.v_x {
+            return;
+        }
+        let straight = Path { kappa: [0.0; 2], mu: 1.0, v_x };
+        let around = Surroundings { body, nominal: *tyres, hold, disturbance: Disturbance::zeros() };
+        let mut x = State::zeros();
+        x[V_X] = v_x;
+        let end = linearise::<f64, N_X>(&(x, Input::zeros()), &straight, tyres, &around);
+        // Without a solution the weight of before stays; its speed was not far.
+        if let Some(weight) = riccati(&end.A, &end.B, &problem.q, &problem.r) {
+            problem.q_terminal = weight * self.factor;
+            self.v_x = v_x;
+        }
+    }
+}
+
 /// Weight on the last state for `x+ = A x + B u` with the stage cost `x' diag(q) x + du' diag(r) du` without end.
 ///
 /// The cost depends on the last command too; it is taken as the best one, which makes the weight a lower bound. Nothing if the
 /// equation has no solution, as for a car that no steering moves.
-pub fn riccati<const N_X: usize>(
+fn riccati<const N_X: usize>(
     A: &SMatrix<f64, N_X, N_X>,
     B: &SMatrix<f64, N_X, NU>,
     q: &SVector<f64, N_X>,
