@@ -293,3 +293,64 @@ impl TyreModel for Adapter {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Disturbance;
+
+    /// Front force of the default tyre, the magic formula with B 10, C 1.4, E 0 [N].
+    fn magic(alpha: f64, mu: f64, load: f64) -> f64 {
+        mu * load * (1.4 * (10.0 * alpha).atan()).sin()
+    }
+
+    #[test]
+    fn nominal_tyres_end_at_the_grip_and_resemble_the_default_tyre() {
+        let p = Parameters::default();
+        let (grip, nominal) = (Grip::new(&p), p.nominal_tyres());
+        let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
+        for mu in [0.4, 0.82] {
+            for k in 0..=20 {
+                let alpha = 0.01 * f64::from(k);
+                let (secant, tangent) = grip.tyres(&nominal, &x, &Input::from([alpha, 0.0]), mu);
+                let force = secant.c_f * alpha;
+                assert!((force - (tangent.f_f0 + tangent.c_f * alpha)).abs() < 1e-6, "one force, two forms");
+                let most = mu * grip.load[0];
+                assert!(force <= most && (force - magic(alpha, mu, grip.load[0])).abs() < 0.02 * most, "{mu} {alpha}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_slope_is_the_derivative_of_the_force() {
+        let p = Parameters::default();
+        let (grip, nominal) = (Grip::new(&p), p.nominal_tyres());
+        let x = State::from([15.0, 0.3, 0.1, 0.0, 0.0]);
+        let force = |delta: f64| {
+            let u = Input::from([delta, 0.0]);
+            let (alpha, _) = slip_angles(&x, delta, &grip.body);
+            grip.tyres(&nominal, &x, &u, 0.82).0.c_f * alpha
+        };
+        for delta in [0.0, 0.03, 0.08] {
+            let slope = (force(delta + 1e-6) - force(delta - 1e-6)) / 2e-6;
+            let (_, tangent) = grip.tyres(&nominal, &x, &Input::from([delta, 0.0]), 0.82);
+            assert!((tangent.c_f - slope).abs() < 1e-5 * slope.abs(), "{delta}: {} for {slope}", tangent.c_f);
+        }
+    }
+
+    #[test]
+    fn the_network_of_another_car_leaves_nominal_tyres_that_know_their_grip() {
+        let text = include_str!("../../resources/jordan.json");
+        let network = Network::from_json(text).unwrap();
+        let p = Parameters { c_f_nominal: 6.0e4, ..Parameters::adaptive() };
+        let mut adapter = Adapter::new(&p, Some(network));
+        let (x, u) = (State::from([15.0, 0.0, 0.0, 0.0, 0.0]), Input::from([0.4, 0.0]));
+        adapter.observe(&x, &u, 0.82);
+        let (c_f, _, confidence) = adapter.believed();
+        assert_eq!(confidence, 0.0);
+        assert!(c_f * 0.4 <= 0.82 * adapter.grip.load[0], "a force beyond friction: {c_f}");
+        let forces = |tyres: &Tyres| crate::model::derivative(&x, &u, 0.0, &p.body(), tyres, &Disturbance::zeros());
+        let (front, want) = (forces(adapter.present()), forces(&Tyres::secant(c_f, 0.0)));
+        assert!((front[YAW_RATE] - want[YAW_RATE]).abs() < 1e-9, "secant and tangent are one force");
+    }
+}

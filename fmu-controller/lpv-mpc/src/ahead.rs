@@ -142,3 +142,55 @@ fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, mu: &Row<T>, p: &Parameters)
     }
     limit
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Straight, then a curve of 1/50 m from element 20 on, at a constant 20 m/s.
+    fn curve(i: usize) -> [f64; 3] {
+        [if i < 20 { 0.0 } else { 0.02 }, 20.0, 0.0]
+    }
+
+    #[test]
+    fn places_are_where_the_reference_is() {
+        let p = Parameters::default();
+        let road = Road::new(|i| [1e-4 * i as f64, 10.0 + 0.1 * i as f64, 0.0], &p);
+        // Trapezoidal sum of a linear speed, in closed form: t (10 + 0.05 t / t_s) at t = 7 periods.
+        let distance = p.t_s * (70.0 + 0.05 * 49.0);
+        assert!((road.curvature(distance) - 7e-4).abs() < 1e-15);
+        assert!((road.wanted(7.0 * p.t_s) - 10.7).abs() < 1e-12);
+        assert_eq!(road.curvature(-1.0), 0.0, "before the beginning the first element holds");
+        assert_eq!(road.curvature(1e9), 40e-4, "beyond the end the last one does");
+        assert!(road.curvature(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn speed_before_a_curve_is_what_full_braking_leaves() {
+        let p = Parameters { a_x_min: -100.0, ..Parameters::default() };
+        let road = Road::new(curve, &p);
+        let grip = p.grip_max * p.mu * p.g;
+        let in_curve = (grip / 0.02).sqrt();
+        let step = 20.0 * p.t_s;
+        assert!((road.at(&road.find(30.0 * step, 0)).2 - in_curve).abs() < 1e-12);
+        // At the curve's first element all grip is lateral, so braking ends one element before it.
+        let (_, _, limit) = road.at(&road.find(9.0 * step, 0));
+        let expected = (in_curve * in_curve + 2.0 * grip * 10.0 * step).sqrt();
+        assert!((limit - expected).abs() < 1e-9, "{limit} for {expected}");
+        let weak = Road::new(curve, &Parameters { a_x_min: -2.0, ..p.clone() });
+        assert!(weak.at(&weak.find(9.0 * step, 0)).2 < limit, "weak brakes need more room");
+        let off = Road::new(curve, &Parameters { grip_max: 0.0, ..p });
+        assert_eq!(off.at(&off.find(30.0 * step, 0)).2, NO_LIMIT);
+    }
+
+    #[test]
+    fn friction_of_the_preview_counts_and_the_parameter_where_there_is_none() {
+        let p = Parameters::default();
+        let road = Road::new(|i| [0.02, 20.0, if i < 20 { 0.0 } else { 0.4 }], &p);
+        let step = 20.0 * p.t_s;
+        assert_eq!(road.friction(5.0 * step), p.mu);
+        assert_eq!(road.friction(30.0 * step), 0.4);
+        let (_, _, limit) = road.at(&road.find(30.0 * step, 0));
+        assert!((limit - (p.grip_max * 0.4 * p.g / 0.02).sqrt()).abs() < 1e-12);
+    }
+}

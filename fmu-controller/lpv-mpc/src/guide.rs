@@ -133,3 +133,60 @@ impl<'a, T: Scalar> Guide<'a, T> {
         path
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::State;
+
+    /// Speeds that the guide gives over `stages` to a car at 20 m/s that wants `wanted` [m/s].
+    fn speeds(p: &Parameters, wanted: f64, stages: usize) -> Vec<f64> {
+        let road = Road::new(|_| [0.0, wanted, 0.0], p);
+        let at = Predicted { x: State::from([20.0, 0.0, 0.0, 0.0, 0.0]), distance: 0.0, actual: Input::zeros() };
+        let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
+        let given = (p, &p.body(), &hold);
+        let mut guide = Guide::new(&road, &at, &Input::zeros(), 0.0, given, &Disturbance::zeros());
+        (0..stages).map(|_| guide.advance(|_| 20.0).v_x).collect()
+    }
+
+    fn without_resistance() -> Parameters {
+        Parameters { c_d: 0.0, c_rr: 0.0, ..Parameters::default() }
+    }
+
+    #[test]
+    fn a_wanted_speed_in_reach_is_followed() {
+        let p = without_resistance();
+        assert!(speeds(&p, 20.0, 40).iter().all(|v| *v == 20.0));
+    }
+
+    #[test]
+    fn the_fastest_rise_is_the_integral_of_the_ramp_and_the_bound() {
+        let p = without_resistance();
+        let rise = speeds(&p, 50.0, 40);
+        // Command after k periods: k times the rate, at most the bound.
+        let mut v_x = 20.0;
+        for (k, got) in rise.iter().enumerate() {
+            v_x += p.t_s * ((k + 1) as f64 * p.a_x_rate_max * p.t_s).min(p.a_x_max);
+            assert!((got - v_x).abs() < 1e-12, "stage {k}: {got} for {v_x}");
+        }
+    }
+
+    #[test]
+    fn a_slow_drive_is_given_time() {
+        let p = Parameters { tau_a_x: 0.5, a_x_rate_max: 1e4, ..without_resistance() };
+        let rise = speeds(&p, 50.0, 40);
+        // Behind a first-order lag: v = v_0 + a (t - tau (1 - exp(-t / tau))).
+        let t = 40.0 * p.t_s;
+        let exact = 20.0 + p.a_x_max * (t - p.tau_a_x * (1.0 - (-t / p.tau_a_x).exp()));
+        // The mean over a period is taken half-way: (t_s / tau)^2 / 12 of the lag's share.
+        assert!((rise[39] - exact).abs() < 1e-3, "{} for {exact}", rise[39]);
+    }
+
+    #[test]
+    fn no_reference_is_slower_than_the_brakes_allow_or_than_standing() {
+        let p = without_resistance();
+        let fall = speeds(&p, 0.0, 40);
+        assert!(fall.windows(2).all(|v| v[0] - v[1] <= -p.a_x_min * p.t_s + 1e-12));
+        assert!(fall.iter().all(|v| *v >= 0.0));
+    }
+}

@@ -87,3 +87,51 @@ impl Recovery {
         (e, (rate / v_x.max(PACE_MIN)).clamp(-1.0, 1.0).asin())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Input, State};
+
+    fn at(v_x: f64, e_y: f64, e_psi: f64) -> Predicted {
+        Predicted { x: State::from([v_x, 0.0, 0.0, e_y, e_psi]), distance: 0.0, actual: Input::zeros() }
+    }
+
+    #[test]
+    fn near_the_path_nothing_acts() {
+        let p = Parameters::default();
+        for (e_y, e_psi) in [(0.0, 0.0), (0.29, 0.0), (-0.29, 0.0), (0.1, 0.05)] {
+            assert!(Recovery::new(&at(14.0, e_y, e_psi), p.mu, &p).is_none(), "{e_y} {e_psi}");
+        }
+        assert!(Recovery::new(&at(14.0, f64::NAN, 0.0), p.mu, &p).is_none());
+        assert!(Recovery::new(&at(14.0, 3.0, 0.0), p.mu, &Parameters::paper()).is_none(), "the paper has no way back");
+    }
+
+    #[test]
+    fn the_way_back_is_smooth_ends_on_the_path_and_mirrors() {
+        let p = Parameters { t_s: 0.1, ..Parameters::default() };
+        let (left, right) = (at(14.0, 3.0, 0.0), at(14.0, -3.0, 0.0));
+        let (left, right) = (Recovery::new(&left, p.mu, &p).unwrap(), Recovery::new(&right, p.mu, &p).unwrap());
+        let mut rate = 0.0;
+        for i in 0..HORIZON_MAX {
+            let (e_y, e_psi) = left.at(i, 14.0);
+            assert_eq!(right.at(i, 14.0), (-e_y, -e_psi));
+            let acceleration = (left.way[i].1 - rate) / p.t_s;
+            rate = left.way[i].1;
+            assert!(acceleration.abs() <= SIDEWAYS * p.mu * p.g + 1e-9, "stage {i}: {acceleration}");
+            // The last metre is a second-order response with damping 0.79, which overshoots by 2 %.
+            assert!((-0.03..=3.0).contains(&e_y), "it overshoots: {e_y}");
+        }
+        // Four seconds: the last 0.1 m fade at LAST_RATE.
+        assert!(left.at(HORIZON_MAX - 1, 14.0).0 < 0.1);
+    }
+
+    #[test]
+    fn a_car_that_heads_away_is_slowed_down_and_one_that_comes_back_gently_is_not() {
+        let p = Parameters::default();
+        let away = Recovery::new(&at(15.0, 0.0, 1.0), p.mu, &p).unwrap();
+        assert!(away.pace < 5.0, "{}", away.pace);
+        let gentle = Recovery::new(&at(15.0, 3.0, -0.1), p.mu, &p).unwrap();
+        assert!(gentle.pace > 15.0, "{}", gentle.pace);
+    }
+}
