@@ -32,7 +32,7 @@ struct Labels {
     note: &'static str,
 }
 
-const CURVE_LABELS: [Labels; 5] = [
+const CURVE_LABELS: [Labels; 6] = [
     Labels {
         sweep: "noise",
         ids: ["robust_noise", "robust_noise_speed"],
@@ -62,6 +62,12 @@ const CURVE_LABELS: [Labels; 5] = [
         ids: ["robust_speed", "robust_speed_speed"],
         titles: ["Speed", "Speed: its error"],
         note: "Grip ends at 17.2 m/s; beyond it the controller slows down instead of leaving the road.",
+    },
+    Labels {
+        sweep: "belief",
+        ids: ["robust_belief", "robust_belief_speed"],
+        titles: ["Another car than assumed", "Another car than assumed: speed error"],
+        note: "Lane change at 14 m/s; the controller keeps its parameters and its network.",
     },
 ];
 

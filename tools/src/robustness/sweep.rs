@@ -1,5 +1,5 @@
 //! Largest errors over what the world does to the loop, one cause at a time: delay and lag together, noise, wind, friction,
-//! speed, and a patch of ice.
+//! speed, a patch of ice, and a car that is another than assumed.
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -96,7 +96,7 @@ fn plans(quick: bool) -> Vec<Plan> {
         gust("side wind", std::f64::consts::FRAC_PI_2),
         gust("head wind", std::f64::consts::PI),
     ]);
-    plans.extend([friction(), patch(true), patch(false), speed(false), speed(true)]);
+    plans.extend([friction(), patch(true), patch(false), speed(false), speed(true), load(), stiffness()]);
     plans
 }
 
@@ -186,6 +186,28 @@ fn speed(slow_steering: bool) -> Plan {
     });
     let name = if slow_steering { "steering of 0.5 rad/s" } else { "steering of 0.8 rad/s" };
     plan("speed", name, "speed [m/s]", points)
+}
+
+/// What the sweeps of the car itself change.
+const BELIEF: &str = "the car's value over the assumed one [1]";
+
+/// A car that is lighter or heavier than the controller assumes, with its yaw inertia.
+fn load() -> Plan {
+    let p = vehicle::Parameters::default();
+    let points = values(0.6, 0.1, 9).map(move |factor| {
+        (factor, vec![Scenario::lane_change(SPEED).with(&[("plant.m", factor * p.m), ("plant.i_z", factor * p.i_z)])])
+    });
+    plan("belief", "mass and yaw inertia", BELIEF, points)
+}
+
+/// Tyres that are softer or stiffer than those of the network, with the same grip.
+fn stiffness() -> Plan {
+    let p = vehicle::Parameters::default();
+    let points = values(0.6, 0.1, 9).map(move |factor| {
+        let tyres = [("plant.tyre_b_f", factor * p.tyre_b_f), ("plant.tyre_b_r", factor * p.tyre_b_r)];
+        (factor, vec![Scenario::lane_change(SPEED).assigned(&["plant.tyre=custom".to_owned()]).with(&tyres)])
+    });
+    plan("belief", "cornering stiffness", BELIEF, points)
 }
 
 #[cfg(test)]

@@ -56,10 +56,10 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<()> {
     let situations = situations(if args.quick { SITUATIONS / 4 } else { SITUATIONS });
     let sets = sets()?;
     let bar = output.bar("driving", (sets.len() * situations.len()) as u64);
-    let scores: Vec<Score> = sets
+    let runs: Vec<Vec<Run>> = sets
         .par_iter()
         .map(|set| {
-            let runs: Vec<Run> = situations
+            situations
                 .par_iter()
                 .map(|situation| {
                     let scenario = situation.clone().assigned(&set.assignments).assigned(&args.set);
@@ -67,12 +67,30 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<()> {
                     bar.inc(1);
                     Ok(run)
                 })
-                .collect::<Result<_>>()?;
-            Ok(Score::new(&set.name, &runs))
+                .collect::<Result<_>>()
         })
         .collect::<Result<_>>()?;
     bar.finish_and_clear();
-    report(args, &scores, situations.len(), output)
+    let scores: Vec<Score> = sets.iter().zip(&runs).map(|(set, runs)| Score::new(&set.name, runs)).collect();
+    report(args, &scores, situations.len(), output)?;
+    for (situation, _) in situations.iter().zip(&runs[0]).filter(|(_, run)| run.score >= LOST) {
+        output.line(&format!("left the road with the default: {}", situation.name));
+    }
+    let file = args.output.join("situations.csv");
+    write_whole(&file, situations_csv(&sets, &situations, &runs).as_bytes())?;
+    output.line(&format!("runs: {}", shown(&file)));
+    Ok(())
+}
+
+/// Each run's score and largest lateral error.
+fn situations_csv(sets: &[Set], situations: &[Scenario], runs: &[Vec<Run>]) -> String {
+    let mut csv = "set,situation,score,e_y_max\n,,1,m\n".to_owned();
+    for (set, runs) in sets.iter().zip(runs) {
+        for (situation, Run { score, e_y, .. }) in situations.iter().zip(runs) {
+            csv += &format!("{},\"{}\",{score},{e_y}\n", set.name, situation.name);
+        }
+    }
+    csv
 }
 
 fn report(args: &Args, scores: &[Score], situations: usize, output: &Output) -> Result<()> {
@@ -189,13 +207,19 @@ fn situations(count: usize) -> Vec<Scenario> {
                 ("plant.gust_direction", draw(-PI, PI)),
             ];
             let noise = [("plant.noise_scale", draw(0.0, 1.5)), ("plant.seed", i as f64)];
+            let name = format!(
+                "{}, friction {mu:.2}, lag {lag:.2} s, delay {delay:.3} s, assumed {error:+.3} s, noise {:.1}, gust {:.0} m/s",
+                if i % 4 == 3 { "general".to_owned() } else { format!("lane change at {speed:.1} m/s") },
+                noise[0].1,
+                gust[1].1,
+            );
             // The general track asks for half of the grip at friction 0.82.
             let road = if i % 4 == 3 {
                 Scenario::on("general").with(&[("plant.mu", mu.max(0.6))])
             } else {
                 Scenario::lane_change(speed).with(&[("plant.mu", mu)])
             };
-            road.with(&gust).with(&noise).slowed(lag, delay, (delay + error).max(0.0))
+            road.with(&gust).with(&noise).slowed(lag, delay, (delay + error).max(0.0)).called(name)
         })
         .collect()
 }

@@ -30,8 +30,8 @@ pub(super) fn cases() -> Vec<Case> {
         |name, asked, limit, scenarios| Case { name, asked, limit: Some(limit), unit: CM, scenarios, measure: lateral };
     vec![
         case("slow_told", "lane change at 14 m/s, lag 0.1 s, delay 50 ms, told", 0.02, vec![told()]),
-        case("slow_wrong", "the same, delay assumed 20 ms wrong", 0.03, wrong().into()),
-        case("slow_noise", "the same, told and wrong, with sensor noise", 0.03, noisy.collect()),
+        case("slow_wrong", "lane change at 14 m/s, lag 0.1 s, delay assumed 20 ms wrong", 0.03, wrong().into()),
+        case("slow_noise", "lane change at 14 m/s, lag 0.1 s, told or wrong, sensor noise", 0.03, noisy.collect()),
         case(
             "very_slow",
             "lane change at 14 m/s, lag 0.3 s, delay 250 ms, told",

@@ -40,7 +40,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("crosswind", "35 m/s of crosswind at once, 2 s later", Some(0.005), side.clone(), |run| {
             lateral_from(run, GUST + RISE + 2.0)
         }),
-        case("crosswind_peak", "the same, at its worst", None, side, lateral),
+        case("crosswind_peak", "35 m/s of crosswind at once, at its worst", None, side, lateral),
         case("head_wind", "a_x saturated by 50 m/s of head wind at 25 m/s", Some(0.1), head_wind(), lateral),
         case(
             "head_wind_bends",
@@ -58,7 +58,7 @@ pub(super) fn cases() -> Vec<Case> {
             unit: ("deg", 180.0 / PI),
             ..case(
                 "far_start_steering",
-                "the same, largest change of steering in a period",
+                "3 m and 60 deg off the path, steering in one period",
                 Some(0.8 * 0.033 + 1e-9),
                 far_starts(),
                 steering_jump,

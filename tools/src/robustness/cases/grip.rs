@@ -43,13 +43,13 @@ pub(super) fn cases() -> Vec<Case> {
         ),
         case(
             "patch_planned",
-            "the same, not seen, but the wanted speed minds it",
+            "friction falls to 0.4, not seen, but the wanted speed minds it",
             Some(0.5),
             vec![Scenario::along(lane_change_over_ice(14.0)).unaware_of_friction().called("14.0 m/s")],
         ),
         case(
             "patch_unseen",
-            "the same, neither seen nor planned for",
+            "friction falls to 0.4, neither seen nor minded",
             None,
             PATCHED.map(|speed| on_ice(speed).unaware_of_friction()).into(),
         ),

@@ -52,7 +52,7 @@ pub(super) fn cases() -> Vec<Case> {
         },
         Case {
             name: "stop_steering_noise",
-            asked: "the same with sensor noise",
+            asked: "25 -> 0 -> 25 m/s, sensor noise: steering while standing",
             limit: Some(0.1_f64.to_radians()),
             unit: steering,
             scenarios: vec![noisy()],
