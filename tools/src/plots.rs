@@ -6,9 +6,9 @@ mod run;
 pub(crate) use page::{Page, assemble};
 pub(crate) use run::page;
 
-use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Marker, Mode, Orientation, Title};
+use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Mode, Orientation, Title};
 use plotly::layout::{Axis, AxisType, Layout, Legend, Margin};
-use plotly::{Bar, HeatMap, Plot, Scatter};
+use plotly::{HeatMap, Plot, Scatter};
 
 /// Colours that stand out on white and on black.
 pub(crate) const BLUE: &str = "#2f80d0";
@@ -90,20 +90,6 @@ pub(crate) fn chart(labels: [&str; 3], axes: [&str; 2], curves: Vec<Curve>) -> C
     for curve in curves {
         let line = Line::new().color(curve.color).dash(curve.dash).width(2.0);
         plot.add_trace(Scatter::new(curve.x, curve.y).mode(Mode::Lines).name(curve.name).line(line));
-    }
-    Chart::new(labels, axes, plot)
-}
-
-/// A chart of groups of bars: each group has a name, its values and its colour.
-pub(crate) fn bars(
-    labels: [&str; 3],
-    axes: [&str; 2],
-    x: &[f64],
-    groups: Vec<(String, Vec<f64>, &'static str)>,
-) -> Chart {
-    let mut plot = Plot::new();
-    for (name, y, color) in groups {
-        plot.add_trace(Bar::new(x.to_vec(), y).name(name).marker(Marker::new().color(color)));
     }
     Chart::new(labels, axes, plot)
 }

@@ -22,7 +22,7 @@ function save(plot) {
   URL.revokeObjectURL(link.href);
 }
 
-const sheet = {width: 24, height: 24, path: 'M4 3h16v18H4zM4 9h16M4 15h16M10 3v18'};
+const tray = {width: 24, height: 24, path: 'M10 3h4v8h4l-6 7-6-7h4zM4 19h16v2H4z'};
 
 function draw(id) {
   const plot = plots[id];
@@ -32,9 +32,10 @@ function draw(id) {
   const axis = old => ({...old, gridcolor: rule, zerolinecolor: rule, linecolor: rule, automargin: true});
   const layout = {...plot.layout, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', font: {color: ink},
     modebar: {bgcolor: 'rgba(0,0,0,0)', color: soft, activecolor: ink},
+    // Below everything else, however many lines the names take on a narrow screen.
+    legend: {...plot.layout.legend, yref: 'container', y: 0, yanchor: 'bottom'},
     xaxis: axis(plot.layout.xaxis), yaxis: axis(plot.layout.yaxis)};
-  const csv = {name: 'csv', title: 'Download data as CSV', click: save,
-    icon: {...sheet, transform: '', style: 'fill: none; stroke: ' + soft + '; stroke-width: 2'}};
+  const csv = {name: 'csv', title: 'Download data as CSV', click: save, icon: tray};
   Plotly.react(id, plot.data, layout, {responsive: true, displaylogo: false, modeBarButtonsToAdd: plot.data[0].z ? [] : [csv],
     toImageButtonOptions: {format: 'svg', filename: id}});
   drawn.add(id);

@@ -7,6 +7,10 @@ use crate::recording::Recording;
 const TIME: &str = "time [s]";
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
+/// Half of what the zoomed trajectory shows along and across the road [m]: two car lengths, and errors that can be told apart.
+const AROUND: f64 = 8.0;
+const ACROSS: f64 = 0.8;
+
 /// A quantity of a run over its time.
 type Quantity<'a> = &'a dyn Fn(&Recording) -> Vec<f64>;
 
@@ -174,28 +178,33 @@ impl<'a> Figure<'a> {
         at.map_or([0.0, 0.0], |i| [x[i], y[i]])
     }
 
+    /// Seen from above; `zoom` is the middle of a part of it.
     fn trajectory(&self, zoom: Option<[f64; 2]>) -> Chart {
-        let mut curves: Vec<Curve> = self
-            .runs
-            .iter()
-            .filter(|run| run.figures.stayed())
+        // Only what the part shows, in full resolution: a long road's curve has few points there.
+        let part = |x: Vec<f64>, y: Vec<f64>| match zoom {
+            None => (x, y),
+            Some([middle, _]) => x.into_iter().zip(y).filter(|(x, _)| (x - middle).abs() < 3.0 * AROUND).unzip(),
+        };
+        let stayed = self.runs.iter().filter(|run| run.figures.stayed());
+        let mut curves: Vec<Curve> = stayed
             .map(|run| {
                 let [x, y] = ["x", "y"].map(|name| run.recording.column(name));
+                let (x, y) = part(x, y);
                 Curve::new(run.who.name(), &x, y, run.who.color())
             })
             .collect();
         let (x, y) = self.ours().path();
+        let (x, y) = part(x, y);
         curves.push(Curve::new("path", &x, y, GREEN).dotted());
         let (name, title, note) = match zoom {
             None => ("trajectory", "Trajectory", "Seen from above; the axes have different scales."),
             Some(_) => {
-                ("zoom", "Trajectory, where the path is sharpest", "Drag to look elsewhere, double-click for all.")
+                ("zoom", "Trajectory, where the path is sharpest", "Drag to look closer, double-click for more.")
             }
         };
         let chart = chart(["", title, note], ["X [m]", "Y [m]"], curves).named(self.id(name));
         match zoom {
-            // A few car lengths along, and the errors of the worse controllers across.
-            Some([x, y]) => chart.zoomed(Some([x - 8.0, x + 8.0]), Some([y - 0.8, y + 0.8])),
+            Some([x, y]) => chart.zoomed(Some([x - AROUND, x + AROUND]), Some([y - ACROSS, y + ACROSS])),
             None => chart,
         }
     }

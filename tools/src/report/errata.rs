@@ -193,20 +193,18 @@ pub fn shots() -> Result<Vec<Shot>> {
             let end = road.duration();
             let mut plant = Vehicle::new(parameters.clone(), road)?;
             let mut driver = PaperMpc::new(printed, parameters.mu);
-            let mut recording = drive(&mut plant, &mut driver, STEP, Some(end), |_| {})?;
-            let left = gone(&recording);
-            // Behind the road's edge there is nothing to see.
-            if let Some(row) = left {
-                recording.rows.truncate(row + 1);
-            }
-            Ok(Shot { name, left: left.map(|row| row as f64 * STEP), recording })
+            let (recording, left) = until_gone(drive(&mut plant, &mut driver, STEP, Some(end), |_| {})?);
+            Ok(Shot { name, recording, left })
         })
         .collect()
 }
 
-/// Sample at which the car has left the road.
-fn gone(recording: &Recording) -> Option<usize> {
-    recording.column("e_y_true").iter().position(|e_y| e_y.is_nan() || e_y.abs() > ROAD)
+/// A run up to where the car left the road, and when that was [s]: beyond there is nothing to see.
+pub fn until_gone(mut recording: Recording) -> (Recording, Option<f64>) {
+    let gone = recording.column("e_y_true").iter().position(|e_y| e_y.is_nan() || e_y.abs() > ROAD);
+    let left = gone.and_then(|row| recording.column("t").get(row).copied());
+    recording.rows.truncate(gone.map_or(recording.rows.len(), |row| row + 1));
+    (recording, left)
 }
 
 /// A controller that is told that its command acts at once, whatever the step: nothing is compensated.

@@ -17,7 +17,11 @@ use anyhow::Result;
 use clap::Parser;
 
 use crate::archive::write_whole;
+use crate::optimise::benchmark;
+use crate::optimise::functions::Function;
 use crate::output::{Output, table};
+use crate::plots::Chart;
+use crate::robustness;
 use crate::workspace::shown;
 use content::Findings;
 use runs::{Run, Situation, Who};
@@ -31,12 +35,16 @@ use runs::{Run, Situation, Who};
 Examples:
   cargo fmu report                    page and data in target/report/
   cargo fmu report --output here/     the same elsewhere
+  cargo fmu report --quick            without the robustness, in a quarter of the time
   cargo fmu report --readme           write the results of README.md from a few seconds of driving
   cargo fmu report --check            fail if they do not hold any more")]
 pub struct Args {
     /// Folder for report.html and its data
     #[arg(long, default_value = "target/report")]
     pub output: PathBuf,
+    /// Leave out the robustness, which takes most of the time
+    #[arg(long)]
+    pub quick: bool,
     /// Write the results into README.md and do nothing else
     #[arg(long, conflicts_with = "check")]
     pub readme: bool,
@@ -44,6 +52,11 @@ pub struct Args {
     #[arg(long)]
     pub check: bool,
 }
+
+/// Searches of each optimiser.
+const SEEDS: usize = 30;
+/// Weights on the steering increment with which the linear MPC is driven besides [1/rad2]: ours and less, by tens.
+const WEIGHTS: [f64; 4] = [300.0, 30.0, 3.0, 0.3];
 
 /// Runs the command.
 pub fn run(args: &Args, output: &Output) -> Result<()> {
@@ -56,7 +69,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.line("README.md holds");
         return Ok(());
     }
-    let findings = find(output)?;
+    let findings = find(args, output)?;
     for line in table(&content::overview(&findings.runs, Situation::General)) {
         output.line(&line);
     }
@@ -79,15 +92,27 @@ fn data_file(run: &Run) -> String {
     format!("{}-{}.csv", run.situation.id(), run.who.id())
 }
 
+/// Medians of the optimisers on the sphere, and their convergence.
+fn optimisers(output: &Output) -> Result<(Vec<Vec<String>>, Chart)> {
+    let progress = output.progress("searching");
+    let found = benchmark::compare(Function::Sphere, SEEDS, benchmark::BUDGET, false)?;
+    let chart = benchmark::convergence(Function::Sphere, SEEDS, benchmark::BUDGET)?;
+    progress.finish_and_clear();
+    Ok((found.rows(), chart))
+}
+
 /// Drives, trains and times everything.
-fn find(output: &Output) -> Result<Findings> {
+fn find(args: &Args, output: &Output) -> Result<Findings> {
     let reference = reference::Reference::open()?;
     let bar = output.bar("driving", (Situation::ALL.len() * Who::ALL.len()) as u64);
     let runs = runs::all(&reference, || bar.inc(1))?;
     bar.finish_and_clear();
+    let weighted = WEIGHTS.iter().map(|r_delta| Ok((*r_delta, runs::weighted(*r_delta)?))).collect::<Result<_>>()?;
     let errata = errata::shots()?;
     let late = content::late()?;
     let learning = learning::learn(output)?;
+    let optimisers = optimisers(output)?;
+    let robustness = if args.quick { None } else { Some(robustness::gather(runs::STEP, &[], true, output)?) };
     let bar = output.bar("timing", Who::ALL.len() as u64);
     // One after the other: a timing beside other work measures the other work.
     let mut times = Vec::new();
@@ -102,5 +127,5 @@ fn find(output: &Output) -> Result<Findings> {
     bar.finish_and_clear();
     let parameters = lpv_mpc::Parameters::adaptive();
     let stale = reference.stale(&parameters)?;
-    Ok(Findings { runs, errata, late, learning, times, stale })
+    Ok(Findings { runs, errata, late, learning, times, weighted, optimisers, robustness, stale })
 }

@@ -215,3 +215,11 @@ pub fn ours(situation: Situation, assignments: &[&str], step: f64) -> Result<Fig
     let (mut plant, mut controller, _) = prepare(situation, &assignments)?;
     Ok(Figures::of(&drive(situation, &mut plant, &mut controller, step)?))
 }
+
+/// LMPC at the measured speed on the general track with other weights on the steering increment [1/rad2].
+pub fn weighted(r_delta: f64) -> Result<Figures> {
+    let (mut plant, _, mut settings) = prepare(Situation::General, &[])?;
+    settings.controller.r_delta = r_delta;
+    let mut driver = Baseline::LinearMeasured.driver(&settings.controller, plant.road());
+    Ok(Figures::of(&drive(Situation::General, &mut plant, &mut driver, STEP)?))
+}

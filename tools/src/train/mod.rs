@@ -33,6 +33,7 @@ Examples:
   cargo fmu train --preset paper-size                 the paper's 8 and 5 neurons, trained our way
   cargo fmu train --preset friction                   friction 0.4 to 1.0, unknown to the network
   cargo fmu train --tyre alcala --noise 1 --wind 20   another tyre, noisy sensors, wind
+  cargo fmu train --set plant.m=2300 --set plant.i_z=3900  another car; tools/guide/own_vehicle.md has the whole way
   cargo fmu train --resume                            go on where an interrupted training stopped
   cargo fmu train --evaluate --seed 7                 score the shipped network on fresh manoeuvres
   cargo fmu train --evaluate --network my.json --json")]
@@ -64,6 +65,9 @@ pub struct Args {
     /// Tyre of the plant (dry_asphalt, alcala, linear)
     #[arg(long, value_name = "NAME")]
     pub tyre: Option<String>,
+    /// A parameter of the vehicle, as plant.NAME=VALUE; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
     /// Smallest and largest friction
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"])]
     pub mu: Option<Vec<f64>>,
@@ -96,6 +100,7 @@ impl Args {
         if let Some(tyre) = &self.tyre {
             recipe.tyre.clone_from(tyre);
         }
+        recipe.set.clone_from(&self.set);
         if let Some([low, high]) = self.mu.as_deref() {
             recipe.mu = (*low, *high);
         }

@@ -9,6 +9,7 @@ use vehicle::tyre::Preset as Tyre;
 
 use super::manoeuvre::{Cover, Manoeuvre};
 use super::stack::Shape;
+use crate::simulate::settings::Settings;
 
 /// Sampling period [s]: the paper's controller period.
 pub const T_S: f64 = 0.033;
@@ -45,6 +46,9 @@ pub struct Recipe {
     pub preset: Preset,
     /// Name of the plant's tyre.
     pub tyre: String,
+    /// Other parameters of the plant, as plant.NAME=VALUE.
+    #[serde(default)]
+    pub set: Vec<String>,
     /// Smallest and largest friction [1].
     pub mu: (f64, f64),
     /// Neurons of the hidden layers.
@@ -85,6 +89,7 @@ impl Recipe {
         let default = Self {
             preset,
             tyre: Parameters::default().tyre.name().to_owned(),
+            set: Vec::new(),
             mu: (own, own),
             hidden: [16, 8],
             accelerations: false,
@@ -108,10 +113,11 @@ impl Recipe {
 
     /// The same recipe in words.
     pub fn words(&self) -> String {
+        let car: String = self.set.iter().map(|assignment| format!(", {assignment}")).collect();
         match self.preset {
-            Preset::Paper => "Adam 5e-4 on batches of 16 samples, 100 epochs, teacher-forced".to_owned(),
+            Preset::Paper => "Adam 5e-4 on batches of 16 samples, 100 epochs, teacher-forced".to_owned() + &car,
             _ => format!(
-                "best of {} starts, up to {} Levenberg-Marquardt steps on the free run, contraction {RHO}, validation-best iterate",
+                "best of {} starts, up to {} Levenberg-Marquardt steps on the free run, contraction {RHO}, validation-best iterate{car}",
                 self.starts, self.steps
             ),
         }
@@ -125,6 +131,18 @@ impl Recipe {
         for width in self.hidden {
             ensure!((1..=widest).contains(&width), "a hidden layer has 1 to {widest} neurons, got {width}");
         }
+        for assignment in &self.set {
+            ensure!(assignment.starts_with("plant."), "only the plant is trained on, got {assignment}");
+            for own in ["tyre", "mu", "noise_scale"] {
+                // Options of their own decide on these, and would silently win.
+                let name = assignment.split_once('=').map_or(assignment.as_str(), |(name, _)| name.trim());
+                ensure!(
+                    name != format!("plant.{own}"),
+                    "{name} is what --tyre, --mu and --noise say, got {assignment}"
+                );
+            }
+        }
+        self.plant()?;
         ensure!(self.starts >= 1 && self.manoeuvres >= 6, "at least 1 start and 6 manoeuvres are needed");
         Ok(())
     }
@@ -136,12 +154,8 @@ impl Recipe {
 
     /// The plant, on the best friction of the recipe.
     pub fn plant(&self) -> Result<Parameters> {
-        Ok(Parameters {
-            tyre: Tyre::named(&self.tyre)?,
-            mu: self.mu.1,
-            noise_scale: self.noise,
-            ..Parameters::default()
-        })
+        let plant = Settings::new("straight", &self.set)?.plant;
+        Ok(Parameters { tyre: Tyre::named(&self.tyre)?, mu: self.mu.1, noise_scale: self.noise, ..plant })
     }
 
     /// Manoeuvres for a purpose, `count` of the standard set or of the set beyond it.
@@ -158,6 +172,31 @@ impl Recipe {
             Purpose::Training => (self.manoeuvres, self.beyond),
             Purpose::Validation => (self.manoeuvres.div_ceil(3), self.beyond.div_ceil(3)),
             Purpose::Evaluation => (60, 30),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(set: &[&str]) -> Recipe {
+        Recipe { set: set.iter().map(|&text| text.to_owned()).collect(), ..Recipe::new(Preset::Default, 1) }
+    }
+
+    #[test]
+    fn another_car_is_what_the_plant_becomes_and_what_the_file_says() {
+        let recipe = of(&["plant.m=2300", "plant.l_f = 1.55"]);
+        recipe.validate().unwrap();
+        let plant = recipe.plant().unwrap();
+        assert_eq!((plant.m, plant.l_f, plant.l_r), (2300.0, 1.55, Parameters::default().l_r));
+        assert!(recipe.words().ends_with(", plant.m=2300, plant.l_f = 1.55"));
+    }
+
+    #[test]
+    fn what_has_an_option_of_its_own_or_is_unknown_is_refused() {
+        for wrong in ["plant.mu=0.5", "controller.m=2300", "plant.mass=2300", "plant.tyre=linear"] {
+            assert!(of(&[wrong]).validate().is_err(), "{wrong}");
         }
     }
 }

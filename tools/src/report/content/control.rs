@@ -1,0 +1,127 @@
+//! The closed loops: everybody's errors and figures, one situation after the other.
+
+use super::{Findings, numbers};
+use crate::baselines::Baseline;
+use crate::plots::Page;
+use crate::recording::{PAPER, Recording};
+use crate::report::charts::Figure;
+use crate::report::data_file;
+use crate::report::runs::{Figures, ROAD, Run, Situation, Who};
+use crate::report::verdict::find;
+
+/// Names and units of the table of a situation.
+const OVERVIEW: [&str; 7] = ["", "e_y rms [cm]", "largest", "v_x rms [m/s]", "largest", "course rms [deg]", "largest"];
+
+/// Everybody's errors in a situation, the paper's first.
+pub fn overview(runs: &[Run], situation: Situation) -> Vec<Vec<String>> {
+    let row = |name: &str, figures: &Figures| {
+        let t = &figures.tracking;
+        let mut row = vec![name.to_owned()];
+        if figures.stayed() {
+            row.extend([
+                format!("{:.3}", 100.0 * t.e_y_rms),
+                format!("{:.2}", 100.0 * t.e_y_max),
+                format!("{:.4}", t.speed_rms),
+                format!("{:.3}", t.speed_max),
+                format!("{:.3}", figures.course_rms.to_degrees()),
+                format!("{:.2}", figures.course_max.to_degrees()),
+            ]);
+        } else {
+            row.push("off the road".to_owned());
+            row.resize(OVERVIEW.len(), "-".to_owned());
+        }
+        row
+    };
+    let paper = Figures { tracking: PAPER, course_max: PAPER.e_psi_max, course_rms: PAPER.e_psi_rms };
+    let mut rows = vec![OVERVIEW.map(str::to_owned).to_vec(), row("paper", &paper)];
+    if situation == Situation::General {
+        // The paper gives no more of its comparison than these two.
+        let cells = ["paper's LMPC + PSO-PID", "32", "-", "0.19", "-", "-", "-"];
+        rows.push(cells.map(str::to_owned).to_vec());
+    }
+    rows.extend(Who::ALL.map(|who| row(who.name(), &find(runs, situation, who).figures)));
+    rows
+}
+
+/// A run as its table shows it: a sample of each period of the controller.
+pub fn samples(run: &Run) -> Recording {
+    if run.who == Who::Nonlinear { run.recording.clone() } else { run.recording.thinned(33) }
+}
+
+/// The section.
+pub fn section(page: &mut Page, findings: &Findings) {
+    page.section("control", "Control");
+    page.text(CONTROL);
+    page.tabs(&Situation::ALL.map(Situation::title), |page, i| situation(page, findings, Situation::ALL[i]));
+}
+
+const CONTROL: &str = "All drive the same plant (magic formula, friction 0.82, ideal actuators) at communication steps of 1 ms, \
+sampled every 33 ms, with the same bounds, from the same signals. Who gets what:
+
+| | model | preview | wind | latency |
+|---|---|---|---|---|
+| LPV-MPC (ours) | LPV, tyres from the network along the plan | curvature, speed | estimated from what the model cannot explain | predicted over |
+| nonlinear MPC (offline) | the plant itself, 30 samples ahead | curvature, speed | known, also ahead | none: commands act at once |
+| LMPC + PID | linear bicycle at one speed between the road's mean and highest, nominal tyres | curvature, speed | not known | predicted over |
+| LMPC at measured speed + PID | the same, linearised at each sample | curvature, speed | not known | predicted over |
+| Stanley + PID | none | curvature now | not known | none |
+| pure pursuit + PID | none | position and speed ahead | not known | none |
+
+LMPC has our weights, bounds, horizon and solver; Stanley's gains are the defaults of MathWorks' block, pure pursuit's those of \
+Autoware's simple pure pursuit. Drag to zoom, double-click to return, click a name to hide it; the camera saves a picture, the \
+arrow saves the data.\n";
+
+fn situation(page: &mut Page, findings: &Findings, situation: Situation) {
+    page.markup(&numbers(&overview(&findings.runs, situation)));
+    page.text(&difference(&findings.runs, situation));
+    let links = Who::ALL.map(|who| {
+        let file = data_file(find(&findings.runs, situation, who));
+        format!("[{}]({file})", who.name())
+    });
+    page.text(&format!("Data, a line for each period: {}.\n", links.join(", ")));
+    if situation == Situation::General {
+        weighted(page, findings);
+    }
+    for chart in Figure::new(situation, &findings.runs).charts() {
+        page.chart(&chart);
+    }
+}
+
+/// How much of the linear MPC's error is its weight and not its model.
+fn weighted(page: &mut Page, findings: &Findings) {
+    let mut rows = vec![["LMPC at measured speed, r_delta", "e_y rms [cm]", "largest"].map(str::to_owned).to_vec()];
+    rows.extend(findings.weighted.iter().map(|(r_delta, figures)| {
+        let t = figures.tracking;
+        vec![format!("{r_delta}"), format!("{:.3}", 100.0 * t.e_y_rms), format!("{:.2}", 100.0 * t.e_y_max)]
+    }));
+    page.text(
+        "Every MPC here has the weights of ours. With less weight on the steering a linear one that knows its speed comes closer in \
+         this loop without delay, lag and noise, at the price of margin against all three:\n",
+    );
+    page.markup(&numbers(&rows));
+}
+
+/// What the table of a situation says, in a sentence.
+fn difference(runs: &[Run], situation: Situation) -> String {
+    let of = |who| find(runs, situation, who).figures;
+    let (ours, best) = (of(Who::Ours), of(Who::Nonlinear));
+    let ratio = |a: f64, b: f64| format!("{:.1}", a / b);
+    let fixed = of(Who::Baseline(Baseline::LinearFixed));
+    let behind = if fixed.stayed() {
+        format!(
+            "The paper's comparison, LMPC at one speed with PID, is {} times behind ours in position and {} times in speed{}.",
+            ratio(fixed.tracking.e_y_rms, ours.tracking.e_y_rms),
+            ratio(fixed.tracking.speed_rms, ours.tracking.speed_rms),
+            if situation == Situation::General { " (paper: 46 and 9.5)" } else { "" }
+        )
+    } else {
+        format!(
+            "The paper's comparison, LMPC at one speed with PID, comes further than {ROAD} m from the path: off the road."
+        )
+    };
+    format!(
+        "{behind} Of the nonlinear MPC, which knows plant and wind, ours is within a factor of {} in position and {} in speed.\n",
+        ratio(ours.tracking.e_y_rms, best.tracking.e_y_rms),
+        ratio(ours.tracking.speed_rms, best.tracking.speed_rms)
+    )
+}
