@@ -3,7 +3,8 @@
 //! The vehicle states are augmented by three accelerations that the model cannot explain, on `v_x`, `v_y` and `yaw_rate`,
 //! each a random walk: wind, grade, bank, a steering offset and tyres that differ from the nominal ones all show there. The
 //! plan takes the estimate as constant along the horizon, which makes the tracking offset-free. Measurements enter one by
-//! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on.
+//! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on. So is, once,
+//! a value that no car in the estimated state would show: a second one in a row is believed.
 
 use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;
@@ -40,6 +41,10 @@ const JUMP_MAX: [f64; NX] = [2.0, 2.0, 1.0, 2.0, 0.5];
 /// Growth of that difference with the time since the last measurement [1/s]: 20 m/s2 for the velocities, twice what tyres give.
 const JUMP_RATE: f64 = 10.0;
 
+/// Innovation, in its own standard deviations, beyond which a measurement is an outlier [1]: noise that is four times what is
+/// assumed reaches it once in twenty measurements, the assumed one never.
+const OUTLIER: f64 = 8.0;
+
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimator<T: Scalar = f64> {
@@ -52,6 +57,8 @@ pub struct Estimator<T: Scalar = f64> {
     kappa: T,
     /// Whether a measurement has been seen to start from.
     started: bool,
+    /// Which measurements were left out as outliers in the last update.
+    left_out: [bool; NX],
     /// Standard deviations of the sensors in units of [`SENSOR_DEVIATION`].
     sensor_noise: f64,
 }
@@ -65,6 +72,7 @@ impl<T: Scalar> Estimator<T> {
             P: SMatrix::zeros(),
             kappa: T::zero(),
             started: false,
+            left_out: [false; NX],
             sensor_noise,
         }
     }
@@ -95,8 +103,12 @@ impl<T: Scalar> Estimator<T> {
             measured[i].re().is_finite() && !near
         };
         let restarts = self.started && (0..NX).any(far) && self.start(measured);
-        for (i, z) in measured.iter().enumerate().filter(|(_, z)| z.re().is_finite()) {
-            self.correct(i, *z);
+        let before = self.left_out;
+        for (i, z) in measured.iter().enumerate() {
+            self.left_out[i] = z.re().is_finite() && !restarts && !before[i] && self.is_outlier(i, *z);
+            if z.re().is_finite() && !self.left_out[i] {
+                self.correct(i, *z);
+            }
         }
         restarts
     }
@@ -112,6 +124,7 @@ impl<T: Scalar> Estimator<T> {
             P: self.P.map(Into::into),
             kappa: self.kappa.into(),
             started: self.started,
+            left_out: self.left_out,
             sensor_noise: self.sensor_noise,
         }
     }
@@ -172,6 +185,11 @@ impl<T: Scalar> Estimator<T> {
             self.P[(i, i)] += T::from(intensity * intensity * duration);
         }
         self.x = x;
+    }
+
+    fn is_outlier(&self, i: usize, z: T) -> bool {
+        let variance = self.P[(i, i)].re() + self.deviation(i).powi(2);
+        self.started && (z - self.x[i]).re().powi(2) > OUTLIER * OUTLIER * variance
     }
 
     /// One measured state; the covariance stays symmetric because its column and row are the same numbers.

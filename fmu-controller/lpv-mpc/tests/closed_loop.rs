@@ -415,3 +415,31 @@ fn a_step_that_is_no_step_is_refused() {
     }
     assert_eq!(controller.samples(), 0);
 }
+
+#[test]
+fn one_wrong_measurement_is_not_believed_and_a_lasting_change_is() {
+    let spike = |state: usize, size: f64, last: usize| {
+        let mut worst: f64 = 0.0;
+        let mut k = 0;
+        Loop { h: 0.033, ..Loop::new(Parameters::default(), slalom) }.drive(
+            4.0,
+            |_, x| {
+                k += 1;
+                let mut measured = *x;
+                if (60..60 + last).contains(&k) {
+                    measured[state] += size;
+                }
+                measured
+            },
+            |_, x, _| worst = worst.max(x[E_Y].abs()),
+        );
+        worst
+    };
+    let undisturbed = spike(V_Y, 0.0, 0);
+    for (state, size) in [(V_X, 1.0), (V_Y, 1.5), (YAW_RATE, 0.8), (E_Y, 1.0), (E_PSI, 0.3)] {
+        let once = spike(state, size, 1);
+        assert!(once < undisturbed + 1e-3, "state {state}: {once} m, without {undisturbed} m");
+    }
+    // The car is steered by what is measured when that stays.
+    assert!(spike(E_Y, 1.0, 40) > 0.5);
+}
