@@ -241,7 +241,7 @@ class Slave:
 
 
 def excitation(name, t):
-    base = {"v_x": 10.0, "v_x_ref": 10.0, "mu_scale": 1.0}.get(name.split("[")[0], 0.0)
+    base = {"v_x": 10.0, "v_x_ref": 10.0, "mu_ref": 0.8, "mu_scale": 1.0}.get(name.split("[")[0], 0.0)
     return base + 0.01 * math.sin(3.0 * t + len(name))
 
 

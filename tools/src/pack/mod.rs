@@ -36,6 +36,9 @@ pub struct Args {
     /// Build for linux64 with glibc 2.17 or newer and for win64, into the same archives
     #[arg(long)]
     pub portable: bool,
+    /// Leave win64 out of the portable archives, even if its toolchain is there
+    #[arg(long, requires = "portable")]
+    pub without_windows: bool,
     /// Folder of the finished archives; target/fmu unless given
     #[arg(long, value_name = "FOLDER")]
     pub into: Option<PathBuf>,
@@ -56,10 +59,11 @@ pub struct Packed {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let mut platforms = vec![Platform::Host];
     if args.portable {
-        platforms = vec![Platform::PortableLinux, Platform::Windows];
-        if let Some(what) = Platform::Windows.missing() {
-            output.line(&format!("WITHOUT WINDOWS: there is no toolchain for win64 here, {what}"));
-            platforms.pop();
+        platforms = vec![Platform::PortableLinux];
+        match Platform::Windows.missing() {
+            _ if args.without_windows => {}
+            None => platforms.push(Platform::Windows),
+            Some(what) => output.line(&format!("WITHOUT WINDOWS: there is no toolchain for win64 here, {what}")),
         }
     }
     let folder = args.into.clone().unwrap_or_else(workspace::archive_folder);
