@@ -30,7 +30,7 @@ class Car:
         return {
             "m": p.m, "i_z": p.I_z, "l_f": p.a, "l_r": p.b, **RESISTANCE,
             "c_f_nominal": stiffness * p.b, "c_r_nominal": stiffness * p.a,
-            "delta_rate_max": p.steering.v_max, "tau_delta": SERVO,
+            "mu": p.tire.p_dy1, "delta_rate_max": p.steering.v_max, "tau_delta": SERVO,
         }
 
     def advance(self, duration, delta, a_x):

@@ -78,14 +78,15 @@ def test_closed_track_is_driven_as_well(controller, model):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_two_thirds_of_the_grip_stay_inside_the_lanes(controller, model):
-    # 16 m/s ask for 6.9 m/s2 of the 10.3 m/s2 that these tyres give; the prediction knows no peak, because the network is of
-    # another car. The first lane of ISO 3888-1 is 1.1 widths and 0.25 m wide: 0.2 m beside this car of 1.61 m.
+def test_five_sixths_of_the_grip_stay_inside_the_lanes(controller, model):
+    # 18 m/s ask for 8.8 m/s2 of the 10.3 m/s2 that these tyres give, load transfer left out. The network is of another car, so
+    # the controller knows stiffness and friction alone. The first lane of ISO 3888-1 is 1.1 widths and 0.25 m wide: 0.2 m
+    # beside this car of 1.61 m.
     car = parameters_vehicle2()
     lane = 0.5 * (1.1 * car.w + 0.25 - car.w)
-    path = double_lane_change(16.0)
-    vehicle = model(car, path.x[0], path.y[0], path.psi[0], 16.0)
-    _, e_y, _, _, _, status, s = drive(controller, vehicle, path, stop=11.5)
+    path = double_lane_change(18.0)
+    vehicle = model(car, path.x[0], path.y[0], path.psi[0], 18.0)
+    _, e_y, _, _, _, status, s = drive(controller, vehicle, path, stop=10.5)
     assert s[-1] > 175.0, "the manoeuvre was not driven to its end"
     assert largest(e_y) <= lane
     assert status.max() <= 1
