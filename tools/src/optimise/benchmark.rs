@@ -170,3 +170,31 @@ pub(crate) fn convergence(function: Function, seeds: usize, budget: usize) -> Re
 fn reached(curve: &Curves, evaluations: usize) -> f64 {
     curve.iter().take_while(|(at, _)| *at <= evaluations).last().map_or_else(|| curve[0].1, |(_, best)| *best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimise::search::evaluations;
+
+    #[test]
+    fn the_budget_is_that_of_the_papers_hundred_iterations() {
+        assert_eq!(BUDGET, evaluations(POPULATION, ITERATIONS));
+    }
+
+    #[test]
+    fn quantiles_lie_between_their_neighbours() {
+        let entry = Entry::new("e", vec![4.0, 1.0, 3.0, 2.0]);
+        assert_eq!((entry.quantile(0.0), entry.median(), entry.quantile(1.0)), (1.0, 2.5, 4.0));
+    }
+
+    #[test]
+    fn medians_are_named_and_the_paper_stands_beside_the_sphere() {
+        let comparison = compare(Function::Sphere, 2, 200, false).unwrap();
+        let json = comparison.medians();
+        assert_eq!((json["function"].as_str(), json["evaluations"].as_u64()), (Some("sphere"), Some(200)));
+        for method in Method::ALL {
+            assert!(json["medians"][method.name()].as_f64().unwrap() >= 0.0);
+        }
+        assert_eq!(comparison.rows()[3].last().unwrap(), "4.24e-8");
+    }
+}

@@ -64,6 +64,8 @@ pub struct Guided {
     aside: Option<Centre>,
     /// Where second centres ended.
     settled: Vec<Vec<f64>>,
+    /// Which points of the archive lie beside one of those.
+    covered: Vec<bool>,
     /// How much of a generation is the models'.
     share: f64,
     asked: Vec<Origin>,
@@ -81,6 +83,7 @@ impl Guided {
             main: None,
             aside: None,
             settled: Vec::new(),
+            covered: Vec::new(),
             share: 0.5,
             asked: Vec::new(),
         }
@@ -144,6 +147,8 @@ impl Guided {
                 .collect()
         };
         let (trials, ours, theirs) = (of(Origin::Evolution), of(Origin::Main), of(Origin::Aside));
+        let beside = |one: &Candidate| self.settled.iter().any(|there| distance(&one.point, there) < APART);
+        self.covered.extend(evaluated.iter().map(beside));
         self.archive.extend_from_slice(evaluated);
         self.evolution.tell(&trials, self.archive.len() as f64 / self.budget as f64);
         for guest in [best_of(&ours), best_of(&theirs)].into_iter().flatten() {
@@ -169,17 +174,18 @@ impl Guided {
         if let Some(aside) = &self.aside
             && (aside.quiet >= PATIENCE || !far(&aside.best.point))
         {
-            self.settled.push(aside.best.point.clone());
+            let there = aside.best.point.clone();
+            for (one, covered) in self.archive.iter().zip(&mut self.covered) {
+                *covered |= distance(&one.point, &there) < APART;
+            }
+            self.settled.push(there);
             self.aside = None;
         }
         if self.aside.is_none() && main.quiet >= PATIENCE {
-            let free = |one: &&Candidate| {
-                far(&one.point) && self.settled.iter().all(|there| distance(&one.point, there) >= APART)
-            };
-            self.aside = self
-                .archive
-                .iter()
-                .filter(free)
+            let points = self.archive.iter().zip(&self.covered);
+            self.aside = points
+                .filter(|(one, covered)| !**covered && far(&one.point))
+                .map(|(one, _)| one)
                 .min_by(|a, b| a.value.total_cmp(&b.value))
                 .map(|best| Centre { best: best.clone(), quiet: 0 });
         }

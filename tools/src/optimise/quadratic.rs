@@ -11,7 +11,7 @@ use super::Candidate;
 const OVERDETERMINED: f64 = 2.0;
 
 /// Points of the widest model, in units of the narrowest.
-const MOST: usize = 8;
+const MOST: usize = 4;
 
 /// What the model recommends.
 #[derive(Clone, Debug)]
@@ -39,8 +39,12 @@ pub fn propose(archive: &[Candidate], best: &Candidate, count: usize) -> Option<
     let sides = best.point.len();
     let mut near: Vec<(f64, &Candidate)> =
         archive.iter().map(|one| (distance(&one.point, &best.point), one)).filter(|(d, _)| d.is_finite()).collect();
+    // Selecting first: sorting all that was ever evaluated would cost more than the fit.
+    if count < near.len() {
+        near.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0));
+        near.truncate(count);
+    }
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
-    near.truncate(count);
     let radius = near.last()?.0;
     // Many more points say little more and cost time.
     let stride = near.len().div_ceil(MOST * points_wanted(sides));

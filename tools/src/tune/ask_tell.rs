@@ -112,3 +112,73 @@ fn write_line(output: &mut impl Write, value: &impl Serialize) -> Result<()> {
     output.flush()?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::tune::setup;
+
+    /// Lets `lines` answer a tuning of ten evaluations; gives what it said and how it ended.
+    fn talk(folder: &Path, lines: &str, resume: bool) -> (Vec<Value>, Result<()>) {
+        let file = folder.join("tuned.ssv");
+        let mut words =
+            "tune --method ga --population 4 --evaluations 10 --search r_delta=1:100".split(' ').collect::<Vec<_>>();
+        words.extend(resume.then_some("--resume"));
+        let args = Args::parse_from(words);
+        let mut said = Vec::new();
+        let end = run(setup(&args).unwrap(), &args, &file, lines.as_bytes(), &mut said);
+        let said = String::from_utf8(said).unwrap();
+        (said.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), end)
+    }
+
+    /// Answers to ids, the value being the id.
+    fn tell(ids: std::ops::Range<usize>) -> String {
+        ids.rev().map(|id| format!("{{\"tell\": [{{\"id\": {id}, \"value\": {id}}}]}}\n")).collect()
+    }
+
+    #[test]
+    fn an_interrupted_talk_goes_on_with_the_open_generation() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        // Generations of 4, 4 and 2: the budget ends the last one.
+        let (whole, end) = talk(folders[0].path(), &(tell(0..4) + &tell(4..8) + &tell(8..10)), false);
+        end.unwrap();
+        assert_eq!(whole.len(), 4);
+        assert_eq!(whole[3]["evaluations"], 10);
+        assert_eq!(whole[3]["best"]["value"], 0.0);
+        assert!(whole[0]["ask"][0]["parameters"]["r_delta"].as_f64().unwrap() >= 1.0);
+
+        let (first, end) = talk(folders[1].path(), &(tell(0..4) + &tell(6..8)), false);
+        assert_eq!(end.unwrap_err().to_string(), "the evaluations ended before the tuning; --resume goes on");
+        let (rest, end) = talk(folders[1].path(), &(tell(4..8) + &tell(8..10)), true);
+        end.unwrap();
+        assert_eq!((&first[..2], &rest[..]), (&whole[..2], &whole[1..]));
+        let set = |k: usize| std::fs::read(folders[k].path().join("tuned.ssv")).unwrap();
+        assert_eq!(set(0), set(1));
+    }
+
+    #[test]
+    fn wrong_answers_are_named() {
+        let message = |lines: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            format!("{:#}", talk(folder.path(), lines, false).1.unwrap_err())
+        };
+        assert_eq!(message(&tell(7..8)), "id 7 was not asked for");
+        assert_eq!(message(&(tell(2..3) + &tell(2..3))), "id 2 was told twice");
+        assert!(message("nonsense\n").starts_with("in the line nonsense"));
+        let folder = tempfile::tempdir().unwrap();
+        let (_, end) = talk(folder.path(), "", true);
+        assert!(format!("{:#}", end.unwrap_err()).starts_with("there is no interrupted tuning to resume"));
+    }
+
+    #[test]
+    fn a_candidate_without_a_value_is_never_the_best() {
+        let folder = tempfile::tempdir().unwrap();
+        let none: String = (0..4).map(|id| format!("{{\"tell\": [{{\"id\": {id}, \"value\": null}}]}}\n")).collect();
+        let (said, end) = talk(folder.path(), &(none + &tell(4..8) + &tell(8..10)), false);
+        end.unwrap();
+        assert_eq!(said[3]["best"]["value"], 4.0);
+    }
+}

@@ -102,11 +102,20 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     if let Some(function) = args.benchmark {
         return compare(args, function, output);
     }
+    let setup = setup(args)?;
+    if args.ask_tell {
+        return ask_tell::run(setup, args, &args.output, std::io::stdin().lock(), std::io::stdout().lock());
+    }
+    session::run(setup, args, &args.output, output)
+}
+
+/// What a tuning depends on.
+fn setup(args: &Args) -> Result<Setup> {
     ensure!(args.step > 0.0 && args.step <= 1.0, "the step must be above 0 and at most 1 s, got {}", args.step);
     let population = usize::from(args.population);
     let budget =
         args.evaluations.map_or_else(|| evaluations(population, usize::from(args.iterations)), |count| count as usize);
-    let setup = Setup {
+    Ok(Setup {
         fitness: args.fitness,
         road: args.road.clone(),
         set: args.set.clone(),
@@ -116,11 +125,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         population,
         budget,
         seed: args.seed,
-    };
-    if args.ask_tell {
-        return ask_tell::run(setup, args, &args.output, std::io::stdin().lock(), std::io::stdout().lock());
-    }
-    session::run(setup, args, &args.output, output)
+    })
 }
 
 fn compare(args: &Args, function: Function, output: &Output) -> Result<()> {
