@@ -19,7 +19,7 @@ SHORT = 0.3
 BOUND = 0.3
 # Back on the path to the deviation of a position sensor [m], at the end.
 BACK = 0.01
-INTERIOR_POINT, SAFE_STOP = 1, 4
+INTERIOR_POINT, SAFE_STOP = 1, 5
 OK, WARNING, ERROR = 0, 1, 3
 MEASURED = ["v_x", "v_y", "yaw_rate", "e_y", "e_psi"]
 PREVIEWS = ["kappa_ref", "v_x_ref"]

@@ -103,7 +103,7 @@ impl Model for LpvMpcController {
             log.log(Category::Event, &format!("sample at {} s: {status}", step.t));
         }
         match status {
-            Status::Optimal | Status::InteriorPoint => Ok(Outcome::Ok),
+            Status::Optimal | Status::InteriorPoint | Status::SecondSolver => Ok(Outcome::Ok),
             Status::Estimated | Status::PreviousPlan | Status::SafeStop => {
                 let Inputs { v_x, v_y, yaw_rate, e_y, e_psi, .. } = &self.inputs;
                 Ok(Outcome::Degraded(format!(

@@ -18,6 +18,11 @@ const STATUS: Enumeration = Enumeration {
             description: "The plan is optimal to the tolerance of an interior point method",
         },
         Item {
+            value: Status::SecondSolver as i32,
+            name: "second_solver",
+            description: "The plan is optimal to the tolerance of Clarabel: the chosen solver, or the structured one had no answer",
+        },
+        Item {
             value: Status::Estimated as i32,
             name: "estimated",
             description: "The plan is optimal, but a measurement was missing or not finite and its estimate was used",

@@ -10,6 +10,8 @@ pub enum Outcome {
     Optimal,
     /// Optimal to the tolerance of an interior point method; the active set could not be told.
     InteriorPoint,
+    /// Optimal to the tolerance of the second solver, Clarabel.
+    SecondSolver,
     /// Within all bounds but not optimal: the iterations ran out.
     MaxIterations,
     /// No plan: the method broke down on numbers it could not handle.
@@ -23,7 +25,7 @@ impl Outcome {
     /// Whether the plan is optimal to a known tolerance.
     #[must_use]
     pub fn is_solved(self) -> bool {
-        matches!(self, Self::Optimal | Self::InteriorPoint)
+        matches!(self, Self::Optimal | Self::InteriorPoint | Self::SecondSolver)
     }
 
     /// Whether there is a plan within the bounds at all.

@@ -24,13 +24,14 @@ use super::{Outcome, Problem, Solution, Stage};
 use active::{Active, Hold};
 use interior::Interior;
 use nalgebra::SVector;
-use riccati::Policy;
+use policy::Policy;
 use serde::{Deserialize, Serialize};
 use warm_start::WarmStart;
 
 mod active;
 mod descent;
 mod interior;
+mod policy;
 mod riccati;
 mod rollout;
 mod sweep;

@@ -6,6 +6,7 @@
 
 use super::super::Stage;
 use super::active::Hold;
+use super::policy::{Policy, invert, policy_gains};
 
 /// Value function in front of a stage.
 #[derive(Clone, Copy, Debug)]
@@ -22,23 +23,15 @@ pub(super) struct Value<const NX: usize, const NU: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor<const NX: usize, const NU: usize> {
     /// Mixed curvature of input and state.
-    G: [[f64; NU]; NX],
+    pub G: [[f64; NU]; NX],
     /// Curvature of the input with its increment's weight.
     H: [[f64; NU]; NU],
     /// Inverse of the same with the rows of held inputs replaced.
-    inverse: [[f64; NU]; NU],
+    pub inverse: [[f64; NU]; NU],
     /// S d
     Sd: [f64; NX],
     /// T' d
     Td: [f64; NU],
-}
-
-/// Optimal input of a stage, `u = K x + L p + k`, stored by columns.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Policy<const NX: usize, const NU: usize> {
-    pub K: [[f64; NU]; NX],
-    pub L: [[f64; NU]; NU],
-    pub k: [f64; NU],
 }
 
 impl<const NX: usize, const NU: usize> Value<NX, NU> {
@@ -56,23 +49,6 @@ impl<const NX: usize, const NU: usize> Value<NX, NU> {
 impl<const NX: usize, const NU: usize> Factor<NX, NU> {
     pub(super) const ZERO: Self =
         Self { G: [[0.0; NU]; NX], H: [[0.0; NU]; NU], inverse: [[0.0; NU]; NU], Sd: [0.0; NX], Td: [0.0; NU] };
-}
-
-impl<const NX: usize, const NU: usize> Policy<NX, NU> {
-    pub(super) const ZERO: Self = Self { K: [[0.0; NU]; NX], L: [[0.0; NU]; NU], k: [0.0; NU] };
-
-    /// The input for a state and a previous input.
-    #[inline(always)]
-    pub(super) fn input(&self, x: &[f64; NX], p: &[f64; NU]) -> [f64; NU] {
-        let mut u = self.k;
-        for j in 0..NU {
-            axpy(p[j], &self.L[j], &mut u);
-        }
-        for k in 0..NX {
-            axpy(x[k], &self.K[k], &mut u);
-        }
-        u
-    }
 }
 
 /// `y += a x`, the shape that the compiler turns into packed instructions.
@@ -245,71 +221,6 @@ pub(super) fn linear_step<const NX: usize, const NU: usize>(
             for l in 0..NU {
                 t_before[j] += factor.H[l][j] * policy.k[l];
             }
-        }
-    }
-}
-
-/// Inverts the curvature of the free inputs by Gauss-Jordan elimination without exchange of rows: the free block is positive
-/// definite, and the rows of held inputs are rows of the identity. By columns.
-#[inline(always)]
-fn invert<const NU: usize>(H: &[[f64; NU]; NU], hold: &[Hold; NU]) -> Option<[[f64; NU]; NU]> {
-    let mut matrix = *H;
-    let mut inverse = [[0.0; NU]; NU];
-    for j in 0..NU {
-        inverse[j][j] = 1.0;
-        if !matches!(hold[j], Hold::Free) {
-            for l in 0..NU {
-                matrix[l][j] = if l == j { 1.0 } else { 0.0 };
-            }
-        }
-    }
-    for j in 0..NU {
-        let pivot = matrix[j][j];
-        if pivot.is_nan() || pivot <= 0.0 {
-            return None;
-        }
-        let scale = 1.0 / pivot;
-        for l in 0..NU {
-            matrix[l][j] *= scale;
-            inverse[l][j] *= scale;
-        }
-        for row in 0..NU {
-            if row != j {
-                let factor = matrix[j][row];
-                for l in 0..NU {
-                    matrix[l][row] -= factor * matrix[l][j];
-                    inverse[l][row] -= factor * inverse[l][j];
-                }
-            }
-        }
-    }
-    Some(inverse)
-}
-
-/// Gains of the policy from the stationarity of the free inputs and the equations of the held ones.
-#[inline(always)]
-fn policy_gains<const NX: usize, const NU: usize>(
-    factor: &Factor<NX, NU>,
-    r: &[f64; NU],
-    hold: &[Hold; NU],
-    policy: &mut Policy<NX, NU>,
-) {
-    let mut from_state = factor.inverse;
-    for j in 0..NU {
-        let (state, input) = match hold[j] {
-            Hold::Free => (-1.0, r[j]),
-            Hold::Fixed(_) => (0.0, 0.0),
-            Hold::Linked(_) => (0.0, 1.0),
-        };
-        for l in 0..NU {
-            policy.L[j][l] = input * factor.inverse[j][l];
-            from_state[j][l] *= state;
-        }
-    }
-    for c in 0..NX {
-        policy.K[c] = [0.0; NU];
-        for j in 0..NU {
-            axpy(factor.G[c][j], &from_state[j], &mut policy.K[c]);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Derivative of the solution with respect to the problem's data.
 
-use super::riccati::{self, Policy, Value};
+use super::policy::Policy;
+use super::riccati::{self, Value};
 use super::sweep::terminal;
 use super::{Hold, Problem, Solution, Stage, Structured, active, rollout};
 use nalgebra::SVector;

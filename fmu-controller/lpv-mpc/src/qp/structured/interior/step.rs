@@ -1,0 +1,194 @@
+//! One step of the interior point method: Newton's directions by the recursion, how far they may be followed, and the way there.
+
+use super::super::Problem;
+use super::super::active::Hold;
+use super::super::riccati::{self, Value, axpy};
+use super::{Interior, Row};
+use nalgebra::SVector;
+
+/// Derivative of the distances with respect to input (upper, lower) or increment (rise, fall).
+const SIGN: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
+
+impl<const NX: usize, const NU: usize> Interior<NX, NU> {
+    pub(super) fn set_targets(&mut self, target: impl Fn(&Row) -> f64) {
+        for rows in &mut self.rows {
+            for row in rows.iter_mut().flatten() {
+                row.target = target(row);
+            }
+        }
+        for row in self.soft.iter_mut().flatten() {
+            row.target = target(row);
+        }
+    }
+
+    /// Tells the active rows by where the predictor drives them: to their bound, or to a zero multiplier. Returns whether
+    /// they are the same as last time.
+    pub(super) fn predict_active(&mut self) -> bool {
+        let mut settled = true;
+        for rows in &mut self.rows {
+            for row in rows.iter_mut().flatten() {
+                let active = row.z > 0.0 && row.ds < -0.5 * row.s;
+                settled &= active == row.active;
+                row.active = active;
+            }
+        }
+        settled
+    }
+
+    /// Newton step as one recursion over differences: backwards with the barrier's curvature and the slopes at the iterate,
+    /// forwards to the directions. Differences, because near the bounds the barrier's curvature times the whole input would
+    /// drown the slopes in rounding.
+    pub(super) fn recursion(&mut self, problem: &Problem<NX, NU>, factorise: bool) -> bool {
+        let N = self.u.len();
+        let u_prev = problem.u_prev_clamped();
+        let mut value = Value::<NX, NU>::ZERO;
+        let has_soft_bound = problem.has_soft_bound();
+        let soft_state = problem.soft_state;
+        for i in (0..N).rev() {
+            let error = SVector::from(self.x[i]) - problem.stages[i].x_ref;
+            if i + 1 < N {
+                for k in 0..NX {
+                    value.S[k][k] += problem.q[k];
+                    value.s[k] += problem.q[k] * error[k];
+                }
+            } else {
+                value.S = problem.q_terminal.data.0;
+                value.s = (problem.q_terminal * error).data.0[0];
+            }
+            if has_soft_bound {
+                for (row, sign) in self.soft[i].iter().zip([1.0, -1.0]) {
+                    let denominator = row.s + row.z / (2.0 * problem.soft);
+                    value.S[soft_state][soft_state] += 0.5 * row.z / denominator;
+                    value.s[soft_state] += sign * 0.5 * (row.z + (row.target - row.s * row.z) / denominator);
+                }
+            }
+            let mut r = problem.r.data.0[0];
+            let mut hold = [Hold::Free; NU];
+            let mut slope = [0.0; NU];
+            for j in 0..NU {
+                if problem.is_frozen(j) {
+                    hold[j] = Hold::Fixed(0.0);
+                    continue;
+                }
+                let p = if i == 0 { u_prev[j] } else { self.u[i - 1][j] };
+                slope[j] = r[j] * (self.u[i][j] - p);
+                for (m, row) in self.rows[i][j].iter().enumerate() {
+                    if row.z > 0.0 {
+                        let inverse = 1.0 / row.s;
+                        let weight = 0.5 * row.z * inverse;
+                        let push = -0.5 * SIGN[m] * row.target * inverse;
+                        if m < 2 {
+                            value.U[j][j] += weight;
+                            value.t[j] += push;
+                        } else {
+                            r[j] += weight;
+                            slope[j] += push;
+                        }
+                    }
+                }
+                value.t[j] += slope[j];
+            }
+            let stage = &problem.stages[i];
+            let policy = &mut self.policies[i];
+            let mut before = Value::ZERO;
+            if factorise {
+                match riccati::step(stage, &[0.0; NX], &value, &r, &hold, policy, &mut before) {
+                    Some(factor) => self.factors[i] = factor,
+                    None => return false,
+                }
+            } else {
+                let after = (&value.s, &value.t);
+                riccati::linear_step(stage, &self.factors[i], &r, &hold, after, policy, (&mut before.s, &mut before.t));
+            }
+            value = before;
+            for j in 0..NU {
+                value.t[j] -= slope[j];
+            }
+        }
+        let mut x = [0.0; NX];
+        let mut p = [0.0; NU];
+        for i in 0..N {
+            p = self.policies[i].input(&x, &p);
+            let stage = &problem.stages[i];
+            let mut next = [0.0; NX];
+            for k in 0..NX {
+                axpy(x[k], &stage.A.data.0[k], &mut next);
+            }
+            for j in 0..NU {
+                axpy(p[j], &stage.B.data.0[j], &mut next);
+            }
+            x = next;
+            self.du[i] = p;
+            self.dx[i] = x;
+        }
+        true
+    }
+
+    /// Directions of distances and multipliers; returns the step length that keeps all of them positive.
+    pub(super) fn directions(&mut self, problem: &Problem<NX, NU>, fraction: f64) -> f64 {
+        let mut inverse_alpha: f64 = fraction;
+        let mut limit = |row: &Row| {
+            inverse_alpha = inverse_alpha.max(-row.ds / row.s).max(-row.dz / row.z);
+        };
+        let mut dp = [0.0; NU];
+        for i in 0..self.u.len() {
+            for j in 0..NU {
+                let du = self.du[i][j];
+                for (m, row) in self.rows[i][j].iter_mut().enumerate() {
+                    if row.z > 0.0 {
+                        row.ds = SIGN[m] * if m < 2 { du } else { du - dp[j] };
+                        row.dz = (row.target - row.z * row.ds) / row.s - row.z;
+                        limit(row);
+                    }
+                }
+                dp[j] = du;
+            }
+            if problem.has_soft_bound() {
+                let k = problem.soft_state;
+                let dx = self.dx[i][k];
+                for (side, row) in self.soft[i].iter_mut().enumerate() {
+                    let dx = if side == 0 { dx } else { -dx };
+                    let soften = 1.0 / (2.0 * problem.soft);
+                    row.dz = (row.target - row.s * row.z + row.z * dx) / (row.s + row.z * soften);
+                    row.ds = row.dz * soften - dx;
+                    limit(row);
+                }
+            }
+        }
+        fraction / inverse_alpha
+    }
+
+    /// Mean product of distance and multiplier after a step along the directions, and the number of rows.
+    pub(super) fn complementarity(&self, alpha: f64) -> (f64, usize) {
+        let mut sum = 0.0;
+        let mut count = 0;
+        let mut add = |row: &Row| {
+            if row.z > 0.0 {
+                sum += (row.s + alpha * row.ds) * (row.z + alpha * row.dz);
+                count += 1;
+            }
+        };
+        self.rows.iter().flatten().flatten().for_each(&mut add);
+        self.soft.iter().flatten().for_each(&mut add);
+        (if count > 0 { sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX)) } else { 0.0 }, count)
+    }
+
+    pub(super) fn advance(&mut self, alpha: f64) {
+        let step = |row: &mut Row| {
+            row.s += alpha * row.ds;
+            row.z += alpha * row.dz;
+        };
+        for rows in &mut self.rows {
+            rows.iter_mut().flatten().filter(|row| row.z > 0.0).for_each(step);
+        }
+        self.soft.iter_mut().flatten().filter(|row| row.z > 0.0).for_each(step);
+        for i in 0..self.u.len() {
+            for j in 0..NU {
+                self.u[i][j] += alpha * self.du[i][j];
+            }
+            for k in 0..NX {
+                self.x[i][k] += alpha * self.dx[i][k];
+            }
+        }
+    }
+}
