@@ -8,6 +8,7 @@ mod learning;
 mod readme;
 mod reference;
 mod runs;
+mod speed;
 mod timing;
 mod verdict;
 
@@ -51,6 +52,9 @@ pub struct Args {
     /// Fail if a number in README.md does not hold any more
     #[arg(long)]
     pub check: bool,
+    /// Search the gains of the baselines' PID again and print them
+    #[arg(long, conflicts_with_all = ["readme", "check"])]
+    pub tune_pid: bool,
 }
 
 /// Searches of each optimiser.
@@ -67,6 +71,13 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     if args.check {
         readme::check()?;
         output.line("README.md holds");
+        return Ok(());
+    }
+    if args.tune_pid {
+        let bar = output.bar("searching", speed::evaluations());
+        let (gains, error) = speed::tune(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        output.line(&format!("{gains:?}\nrms speed error {error:.5} m/s"));
         return Ok(());
     }
     let findings = find(args, output)?;
