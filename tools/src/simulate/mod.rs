@@ -107,9 +107,17 @@ pub fn build(settings: &Settings) -> Result<(Vehicle, Controller)> {
     let plant = Vehicle::new(settings.plant.clone(), road)?;
     let controller = match settings.controller.adaptation {
         Adaptation::Constant => Controller::new(settings.controller.clone(), 0.0)?,
-        _ => Controller::with_network(settings.controller.clone(), 0.0, Network::from_json(NETWORK)?)?,
+        _ => Controller::with_network(settings.controller.clone(), 0.0, network(&settings.network_file)?)?,
     };
     Ok((plant, controller))
+}
+
+/// The network of a file, or the one that ships if the name is empty.
+pub fn network(file: &str) -> Result<Network> {
+    if file.is_empty() {
+        return Ok(Network::from_json(NETWORK)?);
+    }
+    Network::from_json(&read_text(Path::new(file))?).with_context(|| format!("in {file}"))
 }
 
 /// A manoeuvre by its name, or a road from a file.

@@ -14,6 +14,8 @@ pub struct Settings {
     pub plant: vehicle::Parameters,
     /// Parameters of the controller.
     pub controller: lpv_mpc::Parameters,
+    /// File of the controller's network; empty: the one that ships.
+    pub network_file: String,
 }
 
 impl Settings {
@@ -25,6 +27,7 @@ impl Settings {
             road: road.to_owned(),
             plant: vehicle::Parameters::default(),
             controller: lpv_mpc::Parameters::adaptive(),
+            network_file: String::new(),
         };
         defaults.with(assignments)
     }
@@ -34,7 +37,7 @@ impl Settings {
     /// # Errors
     /// If a name is unknown or a value is not what the parameter takes.
     pub fn with(self, assignments: &[String]) -> Result<Self> {
-        let Self { mut road, plant, controller } = self;
+        let Self { mut road, plant, controller, mut network_file } = self;
         let (mut plant, mut controller) = (fields(&plant)?, fields(&controller)?);
         let (mut own_preview, mut other_period) = (false, false);
         for assignment in assignments {
@@ -46,6 +49,7 @@ impl Settings {
                     own_preview |= field == "preview_step";
                     assign(&mut plant, "plant", field, value.trim())?;
                 }
+                Some(("controller", "network_file")) => value.trim().clone_into(&mut network_file),
                 Some(("controller", field)) => {
                     other_period |= field == "t_s";
                     assign(&mut controller, "controller", field, value.trim())?;
@@ -53,7 +57,7 @@ impl Settings {
                 _ => bail!("a name begins with plant. or controller., got {name}"),
             }
         }
-        let mut settings = Self { road, plant: read(plant)?, controller: read(controller)? };
+        let mut settings = Self { road, plant: read(plant)?, controller: read(controller)?, network_file };
         if other_period && !own_preview {
             settings.plant.preview_step = settings.controller.t_s;
         }
@@ -62,7 +66,10 @@ impl Settings {
 
     /// All names with their values, for people who look for one.
     pub fn list(&self) -> Result<Vec<Vec<String>>> {
-        let mut rows = vec![vec!["plant.road".to_owned(), self.road.clone()]];
+        let mut rows = vec![
+            vec!["plant.road".to_owned(), self.road.clone()],
+            vec!["controller.network_file".to_owned(), self.network_file.clone()],
+        ];
         for (side, fields) in [("plant", fields(&self.plant)?), ("controller", fields(&self.controller)?)] {
             for (name, value) in fields {
                 let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);

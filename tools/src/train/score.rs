@@ -96,8 +96,12 @@ pub fn score(
         let error = |(sample, answer): &(&Sample, &[f64; FEEDBACK])| answer[o] - sample.c[o];
         let force = |pair: &(&Sample, &[f64; FEEDBACK])| error(pair) * pair.0.alpha[o] / peak[o];
         let squares: f64 = pairs.iter().map(|pair| error(pair).powi(2)).sum();
-        // A stiffness that never changes has no spread to explain.
-        score.r_squared[o] = if spread > 1e-12 * count * mean * mean { 1.0 - squares / spread } else { f64::NAN };
+        // Of a stiffness that never changes there is nothing to explain; missing it is no explanation.
+        let nothing = 1e-12 * count * mean * mean;
+        score.r_squared[o] = match spread > nothing {
+            true => 1.0 - squares / spread,
+            false => f64::from(u8::from(squares <= nothing)),
+        };
         score.rmse[o] = (squares / count).sqrt();
         score.worst[o] = pairs.iter().map(|pair| error(pair).abs()).fold(0.0, f64::max);
         score.force[o] = (pairs.iter().map(|pair| force(pair).powi(2)).sum::<f64>() / count).sqrt();
