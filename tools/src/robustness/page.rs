@@ -4,7 +4,7 @@ use super::cases::Verdict;
 use super::scenario::Figures;
 use super::sweep::{GRIDS, Series};
 use crate::html::{escape, table};
-use crate::plots::{BLUE, Chart, Curve, ORANGE, chart, heat_map};
+use crate::plots::{BLUE, Chart, Curve, GREY, ORANGE, chart, heat_map};
 
 /// Lateral error at which the grids are cut [cm]: twice what is asked of slow actuators.
 const TOP: f64 = 8.0;
@@ -32,7 +32,13 @@ struct Labels {
     note: &'static str,
 }
 
-const CURVE_LABELS: [Labels; 6] = [
+const CURVE_LABELS: [Labels; 7] = [
+    Labels {
+        sweep: "late",
+        ids: ["robust_late", "robust_late_speed"],
+        titles: ["Delay at high speed", "Delay at high speed: speed error"],
+        note: "General track, up to 25 m/s, lag 0.05 s; told, and assumed 20 ms wrong.",
+    },
     Labels {
         sweep: "noise",
         ids: ["robust_noise", "robust_noise_speed"],
@@ -94,7 +100,7 @@ fn grid(labels: [&str; 3], lines: &[&Series]) -> Chart {
 fn curves(labels: &Labels, lines: &[&Series]) -> Vec<Chart> {
     let Some(over) = lines.first().map(|line| line.over) else { return Vec::new() };
     let draw = |k: usize, axis: &str, figure: fn(&Figures) -> f64| {
-        let curves = lines.iter().zip([BLUE, ORANGE]).map(|(line, color)| {
+        let curves = lines.iter().zip([BLUE, ORANGE, GREY]).map(|(line, color)| {
             let (x, y): (Vec<f64>, Vec<f64>) = line.points.iter().map(|(x, figures)| (*x, figure(figures))).unzip();
             Curve::new(line.name, &x, y, color)
         });

@@ -90,6 +90,7 @@ fn every_second(points: &[Point]) -> Vec<Point> {
 fn plans(quick: bool) -> Vec<Plan> {
     let lags: Vec<f64> = if quick { values(0.0, 0.1, 4) } else { values(0.0, 0.05, 7) }.collect();
     let mut plans = delay_and_lag(&lags);
+    plans.extend([("told", 0.0), ("20 ms too short", -WRONG), ("20 ms too long", WRONG)].map(late));
     plans.extend([
         noise(false),
         noise(true),
@@ -122,6 +123,13 @@ fn delay_and_lag(lags: &[f64]) -> Vec<Plan> {
         })
     };
     GRIDS.into_iter().zip([0.0, -WRONG, WRONG]).flat_map(|(sweep, error)| grid(sweep, error)).collect()
+}
+
+/// Late commands on the general track, whose 25 m/s leave less margin than the lane change.
+fn late((name, error): (&'static str, f64)) -> Plan {
+    let points = values(0.0, 0.05, 6)
+        .map(move |delay| (delay, vec![Scenario::on("general").slowed(0.05, delay, (delay + error).max(0.0))]));
+    plan("late", name, "delay [s]", points)
 }
 
 /// Noisier sensors than the filter assumes, and as noisy as it is told.
