@@ -107,7 +107,7 @@ impl Model for LpvMpcController {
             Status::Estimated | Status::PreviousPlan | Status::SafeStop => {
                 let Inputs { v_x, v_y, yaw_rate, e_y, e_psi, .. } = &self.inputs;
                 Ok(Outcome::Degraded(format!(
-                    "{status} at {} s (v_x {v_x}, v_y {v_y}, yaw_rate {yaw_rate}, e_y {e_y}, e_psi {e_psi})",
+                    "{status} at {} s (v_x {v_x:?}, v_y {v_y:?}, yaw_rate {yaw_rate:?}, e_y {e_y:?}, e_psi {e_psi:?})",
                     step.t
                 )))
             }
