@@ -15,7 +15,7 @@ mod stack;
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Parser;
 
 use crate::output::Output;
@@ -125,26 +125,11 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     args.apply(&mut recipe);
     recipe.validate()?;
     if args.preset == Preset::Paper && cfg!(not(feature = "adam")) {
-        return with_adam();
+        // Adam comes from candle, whose hundred crates take minutes to compile; only the paper's own recipe needs it, so only the first
+        // training by that recipe pays.
+        return workspace::run_again_with("adam");
     }
     let folder = workspace::root().join("target").join("network");
     let file = args.output.clone().unwrap_or_else(|| folder.join(format!("{}.json", args.preset.name())));
     session::run(&recipe, args, &file, output)
-}
-
-/// Runs the same command again with Adam inside.
-///
-/// Adam comes from candle, whose hundred crates take minutes to compile; only the paper's own recipe needs it, so only the
-/// first training by that recipe pays.
-fn with_adam() -> Result<()> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let status = std::process::Command::new(cargo)
-        .current_dir(workspace::root())
-        .args(["run", "--release", "--package", "fmu-tools", "--bin", "fmu", "--features", "adam", "--"])
-        .args(std::env::args_os().skip(1))
-        .status()?;
-    if !status.success() {
-        bail!("training with Adam ended with {status}");
-    }
-    Ok(())
 }
