@@ -31,6 +31,8 @@ pub struct Findings {
     pub learning: Learning,
     /// Computing time of each sample [s].
     pub times: Vec<(Who, Vec<f64>)>,
+    /// The nonlinear MPC on the general track, not told of the wind.
+    pub untold: Figures,
     /// LMPC at the measured speed with other weights on the steering.
     pub weighted: Vec<(f64, Figures)>,
     /// Medians of the optimisers on the paper's function, and how they get there.

@@ -118,6 +118,7 @@ fn find(args: &Args, output: &Output) -> Result<Findings> {
     let bar = output.bar("driving", (Situation::ALL.len() * Who::ALL.len()) as u64);
     let runs = runs::all(&reference, || bar.inc(1))?;
     bar.finish_and_clear();
+    let untold = runs::Figures::of(&reference.run("general_untold")?);
     let weighted = WEIGHTS.iter().map(|r_delta| Ok((*r_delta, runs::weighted(*r_delta)?))).collect::<Result<_>>()?;
     let errata = errata::shots()?;
     let late = content::late()?;
@@ -138,5 +139,5 @@ fn find(args: &Args, output: &Output) -> Result<Findings> {
     bar.finish_and_clear();
     let parameters = lpv_mpc::Parameters::adaptive();
     let stale = reference.stale(&parameters)?;
-    Ok(Findings { runs, errata, late, learning, times, weighted, optimisers, robustness, stale })
+    Ok(Findings { runs, errata, late, learning, times, untold, weighted, optimisers, robustness, stale })
 }

@@ -98,7 +98,9 @@ mod tests {
     #[test]
     fn every_stored_run_reaches_the_end_of_its_road() {
         let reference = Reference::open().unwrap();
-        for (id, length) in [("lane_change", 200.0), ("lane_change_wind", 200.0), ("general", 2000.0)] {
+        let runs =
+            [("lane_change", 200.0), ("lane_change_wind", 200.0), ("general", 2000.0), ("general_untold", 2000.0)];
+        for (id, length) in runs {
             let run = reference.run(id).unwrap();
             let last = *run.column("s").last().unwrap();
             // The last row is the sample before the end: one period at up to 25 m/s.

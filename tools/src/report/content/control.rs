@@ -80,6 +80,13 @@ fn situation(page: &mut Page, findings: &Findings, situation: Situation) {
     });
     page.text(&format!("Data, a line for each period: {}.\n", links.join(", ")));
     if situation == Situation::General {
+        let e_y = |figures: &Figures| 100.0 * figures.tracking.e_y_rms;
+        page.text(&format!(
+            "What the nonlinear MPC owes to being told the wind: without it, its lateral error is {:.2} cm rms, ours, which has to find \
+             the wind out, {:.2} cm.\n",
+            e_y(&findings.untold),
+            e_y(&find(&findings.runs, situation, Who::Ours).figures)
+        ));
         weighted(page, findings);
     }
     for chart in Figure::new(situation, &findings.runs).charts() {
