@@ -62,7 +62,7 @@ impl<T: Scalar> Road<T> {
             std::array::from_fn(
                 |i| if rows[i][2].re() > 0.0 { rows[i][2].larger(FRICTION_MIN) } else { T::from(p.mu) },
             );
-        let limit = permitted(&s, &kappa, &mu, p);
+        let limit = permitted(&s, &kappa, &v_x, &mu, p);
         Self { s, kappa, v_x, mu, limit, period: p.t_s }
     }
 
@@ -116,14 +116,18 @@ impl<T: Scalar> Place<T> {
 /// Largest speed at each place that stays within the share of the grip that may be planned with [m/s].
 ///
 /// In a curve the lateral acceleration takes it, before a curve the braking; where both are needed they share the circle of
-/// friction. Passed from the end of the preview to its beginning, as for the speed profile of a racing line.
-fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, mu: &Row<T>, p: &Parameters) -> Row<T> {
+/// friction. Passed from the end of the preview to its beginning, as for the speed profile of a racing line. Where every
+/// place could be driven at the fastest wanted speed, nothing is limited, and nothing is passed.
+fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, v_x: &Row<T>, mu: &Row<T>, p: &Parameters) -> Row<T> {
     let mut limit = [T::from(NO_LIMIT); PREVIEW];
-    if p.grip_max == 0.0 {
+    let fastest = v_x.iter().fold(0.0, |fastest: f64, v_x| fastest.max(v_x.re()));
+    let grip = |i: usize| mu[i] * (p.grip_max * p.g);
+    let is_easy = |i: usize| kappa[i].re().abs() * fastest * fastest <= grip(i).re();
+    if p.grip_max == 0.0 || (0..PREVIEW).all(is_easy) {
         return limit;
     }
     for i in (0..PREVIEW).rev() {
-        let grip = mu[i] * (p.grip_max * p.g);
+        let grip = grip(i);
         let curvature = if kappa[i].re() < 0.0 { -kappa[i] } else { kappa[i] };
         if curvature.re() > STRAIGHT {
             limit[i] = (grip / curvature).sqrt();
