@@ -92,14 +92,17 @@ struct Outcome {
     error: [f64; 3],
 }
 
+/// Largest lateral error [m] and RMSE of the speed [m/s] of every mode.
+type Run = [(f64, f64); 3];
+
 impl Outcome {
     /// From the runs of every seed, each with the figures of every mode.
-    fn new(situation: Situation, runs: &[[(f64, f64); 3]]) -> Self {
+    fn new(situation: Situation, runs: &[Run]) -> Self {
         let n = runs.len() as f64;
-        let mean = |of: &dyn Fn(&[(f64, f64); 3]) -> f64| runs.iter().map(of).sum::<f64>() / n;
+        let mean = |of: &dyn Fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / n;
         let e_y = [0, 1, 2].map(|mode| mean(&|run| run[mode].0.min(ROAD)));
         let error = [0, 1, 2].map(|mode| {
-            let difference = |run: &[(f64, f64); 3]| run[mode].0.min(ROAD) - run[0].0.min(ROAD);
+            let difference = |run: &Run| run[mode].0.min(ROAD) - run[0].0.min(ROAD);
             let centre = mean(&difference);
             let squares = runs.iter().map(|run| (difference(run) - centre).powi(2)).sum::<f64>();
             if runs.len() > 1 { (squares / (n - 1.0) / n).sqrt() } else { 0.0 }
@@ -128,7 +131,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         .map(|situation| {
             let mut runs = Vec::new();
             for seed in situation.seeds() {
-                let mut run = [(0.0, 0.0); 3];
+                let mut run: Run = [(0.0, 0.0); 3];
                 for (figures, mode) in run.iter_mut().zip(MODES) {
                     *figures = drive(args, &situation, mode, seed)?;
                     bar.inc(1);
