@@ -2,15 +2,21 @@
 //!
 //! On standard output, a line for each generation:
 //!
-//!     {"generation": 0, "ask": [{"id": 0, "parameters": {"q_v_x": 5.0, "r_delta": 300.0}}, {"id": 1, ...}]}
+//! ```json
+//! {"generation": 0, "ask": [{"id": 0, "parameters": {"q_v_x": 5.0, "r_delta": 300.0}}, {"id": 1, ...}]}
+//! ```
 //!
 //! On standard input, one or more lines until every id of the generation has its value, in any order:
 //!
-//!     {"tell": [{"id": 1, "value": 0.93}, {"id": 0, "value": null}]}
+//! ```json
+//! {"tell": [{"id": 1, "value": 0.93}, {"id": 0, "value": null}]}
+//! ```
 //!
 //! `null` is a candidate that could not be evaluated. Ids count up over the whole tuning. The last line is
 //!
-//!     {"evaluations": 750, "best": {"parameters": {...}, "value": 0.71}}
+//! ```json
+//! {"evaluations": 750, "best": {"parameters": {...}, "value": 0.71}}
+//! ```
 //!
 //! A tuning whose other side goes away is resumed by --resume: generations that were told are not asked again, and the one that
 //! was open is asked again with the same ids and parameters, so that values that are known already can be told at once.
