@@ -1,5 +1,7 @@
 //! Every variable of the controller, once.
 
+use std::sync::OnceLock;
+
 use lpv_mpc::parameters::HORIZON_MAX;
 use lpv_mpc::preview::PREVIEW;
 use lpv_mpc::{Adaptation, Backend, Estimation, Inputs, Status, TerminalCost};
@@ -123,7 +125,8 @@ fn place(inputs: &mut Inputs, reference: u32) -> Option<&mut f64> {
         k if k < 5 + PREVIEW => &mut inputs.kappa_ref[k - 5],
         k if k < LEADING => &mut inputs.v_x_ref[k - 5 - PREVIEW],
         k => {
-            let first = table().find("mu_ref[1]")? as usize;
+            static FIRST: OnceLock<Option<u32>> = OnceLock::new();
+            let first = (*FIRST.get_or_init(|| table().find("mu_ref[1]")))? as usize;
             inputs.mu_ref.get_mut(k.checked_sub(first)?)?
         }
     })
@@ -231,8 +234,8 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Input mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times; 0: unknown, mu holds", terminal "preview", min 0.0, max 5.0 => inputs.mu_ref;
         Parameter terminal_cost "What the state at the end of the horizon costs, before terminal_factor", items &TERMINAL_COST
             => { get |m| m.parameters.terminal_cost as i32, set |m, v: i32| m.parameters.terminal_cost = terminal_cost(v) };
-        Tunable mu ["1"] "Friction of the road where mu_ref does not tell it", min 0.01, max 5.0 => parameters.mu;
-        Tunable grip_max ["1"] "Share of the grip that the planned speed may use; 0: the wanted speed is planned whatever it takes", min 0.0, max 2.0 => parameters.grip_max;
+        Tunable mu ["1"] "Friction of the road where mu_ref does not tell it, and that at which c_f_nominal and c_r_nominal hold", min 0.01, max 5.0 => parameters.mu;
+        Tunable grip_max ["1"] "Share of the grip that the planned speed may use; 0: the wanted speed is planned whatever it takes, and no way back from far off the path", min 0.0, max 2.0 => parameters.grip_max;
     }
 }
 

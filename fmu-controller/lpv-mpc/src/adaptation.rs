@@ -129,6 +129,8 @@ impl Adapter {
         if self.mode == Adaptation::Constant {
             return;
         }
+        // A preview that is no number leaves no plan, but the filter goes on.
+        let mu = if mu.is_finite() { mu } else { self.grip.mu };
         let (memory, secant, tangent, confidence) = self.answer(&self.memory, x, u, mu);
         (self.memory, self.present) = (memory, tangent);
         self.believed = (secant.c_f, secant.c_r, confidence);

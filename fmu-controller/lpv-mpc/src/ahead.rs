@@ -16,7 +16,10 @@ const PACE_MIN: f64 = 0.1;
 const STRAIGHT: f64 = 1e-5;
 
 /// No road is more slippery than this [1]: wet ice has 0.05.
-const FRICTION_MIN: f64 = 0.05;
+pub const FRICTION_MIN: f64 = 0.05;
+
+/// Share of the squared grip that counts as none left [1]: far above rounding, and 3e-5 of the grip itself.
+const ROUNDING: f64 = 1e-9;
 
 /// Speed that stands for no limit [m/s].
 const NO_LIMIT: f64 = 1e3;
@@ -58,10 +61,9 @@ impl<T: Scalar> Road<T> {
         for i in 1..PREVIEW {
             s[i] = s[i - 1] + ((v_x[i - 1] + v_x[i]) * 0.5).larger(PACE_MIN) * p.t_s;
         }
-        let mu =
-            std::array::from_fn(
-                |i| if rows[i][2].re() > 0.0 { rows[i][2].larger(FRICTION_MIN) } else { T::from(p.mu) },
-            );
+        let mu = std::array::from_fn(|i| {
+            if rows[i][2].re() > 0.0 { rows[i][2].larger(FRICTION_MIN) } else { T::from(p.mu.max(FRICTION_MIN)) }
+        });
         let limit = permitted(&s, &kappa, &v_x, &mu, p);
         Self { s, kappa, v_x, mu, limit, period: p.t_s }
     }
@@ -137,7 +139,8 @@ fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, v_x: &Row<T>, mu: &Row<T>, p
         }
         let lateral = limit[i + 1] * limit[i + 1] * kappa[i + 1];
         let left = grip * grip - lateral * lateral;
-        let braking = if left.re() > 0.0 { left.sqrt() } else { T::zero() };
+        // At the entry of a limiting curve nothing but rounding is left, whose root has no meaningful derivative.
+        let braking = if left.re() > ROUNDING * (grip * grip).re() { left.sqrt() } else { T::zero() };
         let braking = if braking.re() > -p.a_x_min { T::from(-p.a_x_min) } else { braking };
         let before = (limit[i + 1] * limit[i + 1] + (s[i + 1] - s[i]) * braking * 2.0).sqrt();
         if before.re() < limit[i].re() {

@@ -22,7 +22,8 @@ const ORDER: usize = 4;
 /// What depends on the step and the lags alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hold {
-    step: f64,
+    /// Step [s].
+    pub step: f64,
     /// Time constants of the actuators [s].
     tau: [f64; NU],
     /// What is left of a lag's distance to its command after the step [1].

@@ -4,7 +4,8 @@
 //! each a random walk: wind, grade, bank, a steering offset and tyres that differ from the nominal ones all show there. The
 //! plan takes the estimate as constant along the horizon, which makes the tracking offset-free. Measurements enter one by
 //! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on. So is, once,
-//! a value that no car in the estimated state would show: a second one in a row is believed.
+//! a value that no car in the estimated state would show: a second one in a row is believed. Beyond [`JUMP_MAX`] the filter starts
+//! again.
 
 use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;

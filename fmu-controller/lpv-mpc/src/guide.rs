@@ -18,6 +18,8 @@ pub struct Path<T> {
     pub kappa: [T; 2],
     /// Friction in the middle of the stage [1].
     pub mu: T,
+    /// Speed that is wanted at the end of the stage, whether it can be had or not [m/s].
+    pub wanted: T,
     /// Speed to be followed at the end of the stage [m/s].
     pub v_x: T,
 }
@@ -82,7 +84,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
         (p, body, hold): (&Parameters, &Body, &Hold),
         disturbance: &Disturbance<T>,
     ) -> Self {
-        let ratio = (at.x[V_X].re() / V_GUARD).min(1.0);
+        let ratio = at.x[V_X] / at.x[V_X].larger(V_GUARD);
         let reach = [p.a_x_max, p.a_x_min].map(|bound| Reach {
             v_x: at.x[V_X],
             command: u_prev[A_X],
@@ -128,7 +130,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
         } else {
             permitted
         };
-        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, v_x };
+        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, wanted, v_x };
         (self.kappa, self.mu) = (kappa, mu);
         path
     }

@@ -40,9 +40,9 @@ pub struct Parameters {
     pub c_f_nominal: f64,
     /// Nominal rear cornering stiffness of the axle [N/rad].
     pub c_r_nominal: f64,
-    /// Friction of the road where the preview does not tell it [1].
+    /// Friction of the road where the preview does not tell it, and that at which the nominal stiffnesses hold [1].
     pub mu: f64,
-    /// Share of the grip that the planned speed may use; 0: any speed that is wanted [1].
+    /// Share of the grip that the planned speed may use; 0: any speed that is wanted, and no way back from far off the path [1].
     pub grip_max: f64,
     /// Controller period [s].
     pub t_s: f64,
@@ -109,6 +109,8 @@ impl Default for Parameters {
             q_v_x: 5.0,
             r_delta: 300.0,
             r_a_x: 0.1,
+            // `cargo fmu robustness`: lane changes from 14 to 20 m/s stay within 9 cm; 0.95 leaves 11 cm at 17 m/s, 0.85 gains
+            // nothing and is slower.
             grip_max: 0.9,
             estimation: Estimation::Kalman,
             ..Self::paper()

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::{DELTA, Input};
 
-/// Change of the planned steering from one sample to the next at which half of the new plan is scheduled [rad].
+/// Change of the planned steering from one sample to the next at which half of the new plan is scheduled [rad]. Lane change at
+/// 20 m/s and 17 m/s: 4.9 and 1.8 cm; with 0.05: 5.6 and 3.0 cm; with 0.003: 49 and 6.4 cm, and starts far off the path are lost.
 ///
 /// Where tyres saturate, or far off the path, the plan may alternate between two that contradict each other, each made around
 /// the other; smaller changes are the ordinary ones.

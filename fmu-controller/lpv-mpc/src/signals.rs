@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
-use crate::ahead::Road;
+use crate::ahead::{FRICTION_MIN, Road};
 use crate::ladder::Status;
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::parameters::{HORIZON_MAX, Parameters};
@@ -65,7 +65,10 @@ impl Inputs {
             e_psi: self.e_psi + duration * rates.e_psi,
             kappa_ref: self.kappa_ref + rates.kappa_ref * duration,
             v_x_ref: self.v_x_ref + rates.v_x_ref * duration,
-            mu_ref: self.mu_ref + rates.mu_ref * duration,
+            // A friction that falls must not fall to 0, which stands for an unknown one.
+            mu_ref: self.mu_ref.zip_map(&rates.mu_ref, |mu, rate| {
+                if mu > 0.0 { (mu + rate * duration).max(FRICTION_MIN) } else { mu + rate * duration }
+            }),
             hold_preview: self.hold_preview,
         }
     }

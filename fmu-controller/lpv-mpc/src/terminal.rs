@@ -26,7 +26,8 @@ const DOUBLINGS: usize = 30;
 /// Relative change that counts as none [1]; the doubling converges quadratically, so the next one is at rounding.
 const CONVERGED: f64 = 1e-9;
 
-/// Relative change of the speed up to which the weight of the last state stays [1].
+/// Relative change of the speed up to which the weight of the last state stays [1]: the lateral modes change about as much, and
+/// at 14 m/s it is passed a few times a second under full braking, so that most samples need no new weight.
 const SAME_SPEED: f64 = 0.02;
 
 /// How the last state is weighed.
@@ -58,7 +59,7 @@ impl Terminal {
         if self.cost == TerminalCost::StageWeights || (v_x - self.v_x).abs() <= SAME_SPEED * self.v_x {
             return;
         }
-        let straight = Path { kappa: [0.0; 2], mu: 1.0, v_x };
+        let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x };
         let around = Surroundings { body, nominal: *tyres, hold, disturbance: Disturbance::zeros() };
         let mut x = State::zeros();
         x[V_X] = v_x;
@@ -84,10 +85,10 @@ fn riccati<const N_X: usize>(
     // Unused places between states and command stay zero.
     const U: usize = NZ - NU;
     let (mut F, mut G, mut H) = (Square::zeros(), Square::zeros(), Square::zeros());
-    F.view_mut((0, 0), (N_X, N_X)).copy_from(A);
-    F.view_mut((0, U), (N_X, NU)).copy_from(B);
+    F.fixed_view_mut::<N_X, N_X>(0, 0).copy_from(A);
+    F.fixed_view_mut::<N_X, NU>(0, U).copy_from(B);
     let mut input = SMatrix::<f64, NZ, NU>::zeros();
-    input.view_mut((0, 0), (N_X, NU)).copy_from(B);
+    input.fixed_view_mut::<N_X, NU>(0, 0).copy_from(B);
     for j in 0..NU {
         F[(U + j, U + j)] = 1.0;
         input[(U + j, j)] = 1.0;
@@ -97,13 +98,10 @@ fn riccati<const N_X: usize>(
         H[(i, i)] = q[i];
     }
     let P = double(F, G, H)?;
-    let states = P.view((0, 0), (N_X, N_X)).into_owned();
-    let to_command = P.fixed_view::<NU, NZ>(U, 0).into_owned();
-    let to_states = to_command.view((0, 0), (NU, N_X)).into_owned();
+    let to_states = P.fixed_view::<NU, N_X>(U, 0).into_owned();
     let command = P.fixed_view::<NU, NU>(U, U).into_owned();
-    let reduced = &states - to_states.transpose() * command.try_inverse()? * &to_states;
-    let mut weight = SMatrix::<f64, N_X, N_X>::zeros();
-    weight.copy_from(&((&reduced + reduced.transpose()) * 0.5));
+    let reduced = P.fixed_view::<N_X, N_X>(0, 0) - to_states.transpose() * command.try_inverse()? * to_states;
+    let weight = (reduced + reduced.transpose()) * 0.5;
     (weight.iter().all(|w| w.is_finite()) && (0..N_X).all(|i| weight[(i, i)] >= 0.0)).then_some(weight)
 }
 

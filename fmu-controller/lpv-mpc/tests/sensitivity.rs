@@ -102,6 +102,12 @@ fn derivative_goes_through_lags_and_delay() {
 }
 
 #[test]
+fn derivative_goes_through_the_limit_of_speed() {
+    // 0.1 of the grip: the slalom then asks for less speed nearly everywhere.
+    compare(&Parameters { grip_max: 0.1, ..Parameters::default() });
+}
+
+#[test]
 fn derivative_of_the_papers_controller() {
     compare(&Parameters { estimation: Estimation::Measured, ..Parameters::default() });
 }

@@ -9,6 +9,9 @@ use crate::{
     plant::State,
 };
 
+/// Least friction that is shown [1]: to a controller, 0 stands for an unknown one.
+const FRICTION_SHOWN: f64 = 1e-3;
+
 impl Vehicle {
     /// What the sensors show.
     #[must_use]
@@ -28,7 +31,7 @@ impl Vehicle {
     #[must_use]
     pub fn preview(&self) -> Preview {
         let Self { road, state: State { x, inputs, .. }, derived, .. } = self;
-        let friction = |s| derived.dynamics.friction(road, s) * inputs.mu_scale;
+        let friction = |s: f64| (derived.dynamics.friction(road, s) * inputs.mu_scale).max(FRICTION_SHOWN);
         road.preview(x[S], self.parameters.preview_step, friction)
     }
 

@@ -9,7 +9,7 @@ const SHOWN: f64 = 0.12;
 /// Error over speed for each friction value.
 pub(super) fn of(results: &[Outcome]) -> String {
     const CHARTS: [[&str; 3]; 4] = [
-        ["mu04", "Friction 0.4", "The network was trained at 0.82; what it is told of the road scales its forces."],
+        ["mu04", "Friction 0.4", "The network was trained at 0.82."],
         ["mu06", "Friction 0.6", ""],
         ["mu082", "Friction 0.82", "What the network was trained for."],
         ["mu10", "Friction 1.0", ""],

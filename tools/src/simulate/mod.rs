@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use lpv_mpc::jordan::Network;
-use lpv_mpc::{Adaptation, Controller};
+use lpv_mpc::{Adaptation, Controller, Status};
 use vehicle::{Road, Vehicle};
 
 use crate::archive::{read_text, write_whole};
@@ -132,7 +132,7 @@ fn road(name: &str, parameters: &vehicle::Parameters) -> Result<Road> {
 fn summary(args: &Args, settings: &Settings, run: &Recording, seconds: f64, output: &Output) {
     let last = |name: &str| run.column(name).last().copied().unwrap_or_default();
     let status = run.column("status");
-    let degraded = status.iter().filter(|&&status| status >= 2.0).count();
+    let degraded = status.iter().filter(|&&status| status >= f64::from(Status::Estimated as u8)).count();
     output.line(&format!(
         "{} over {:.0} m and {:.2} s at steps of {} ms, in {seconds:.2} s of computing\n",
         settings.road,
@@ -147,7 +147,7 @@ fn summary(args: &Args, settings: &Settings, run: &Recording, seconds: f64, outp
     output.line(&format!("\ngrip in use, largest      {:>5.0} %", 100.0 * grip));
     if degraded > 0 {
         output
-            .line(&format!("degraded answers          {degraded} of {} samples have status 2 or worse", status.len()));
+            .line(&format!("degraded answers          {degraded} of {} samples are worse than optimal", status.len()));
     }
 }
 

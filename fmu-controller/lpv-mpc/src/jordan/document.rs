@@ -208,7 +208,7 @@ impl Document {
     }
 
     fn check_numbers(&self) -> Result<(), Error> {
-        let Self { t_s, l_f, l_r, c_f_nominal, c_r_nominal, inputs, outputs, envelope, .. } = self;
+        let Self { t_s, l_f, l_r, c_f_nominal, c_r_nominal, inputs, outputs, envelope, provenance, .. } = self;
         let wrong = |what: String| Err(Error::NetworkInvalid(what));
         for (name, value) in
             [("t_s", t_s), ("l_f", l_f), ("l_r", l_r), ("c_f_nominal", c_f_nominal), ("c_r_nominal", c_r_nominal)]
@@ -216,6 +216,10 @@ impl Document {
             if !(*value > 0.0 && value.is_finite()) {
                 return wrong(format!("{name} of {value}, expected a positive number"));
             }
+        }
+        let [lowest, highest] = provenance.mu;
+        if !(lowest > 0.0 && lowest <= highest && highest.is_finite()) {
+            return wrong(format!("a friction from {lowest} to {highest}"));
         }
         for Scaling { mean, deviation } in inputs.iter().chain(outputs) {
             if !(mean.is_finite() && *deviation > 0.0 && deviation.is_finite()) {

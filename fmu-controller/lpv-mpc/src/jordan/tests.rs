@@ -236,3 +236,14 @@ fn impossible_sizes_and_numbers_are_refused_by_name() {
         refuse(&|d| d.layers[0].biases[0] = f64::NAN).starts_with("network file is not readable: invalid type: null")
     );
 }
+
+#[test]
+fn a_friction_that_no_road_has_is_refused() {
+    let good: Document = network(8, &[7, 8, 5, 2]).into();
+    for mu in [[0.9, 0.4], [0.0, 0.8], [-1.0, 0.8], [0.4, f64::INFINITY], [f64::NAN, 0.8]] {
+        let mut wrong = good.clone();
+        wrong.provenance.mu = mu;
+        let error = Network::try_from(wrong).unwrap_err().to_string();
+        assert!(error.contains("friction"), "{error}");
+    }
+}
