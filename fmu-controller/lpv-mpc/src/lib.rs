@@ -26,6 +26,7 @@ pub mod controller;
 pub mod discretise;
 mod error;
 pub mod estimator;
+mod grip;
 mod guide;
 mod horizon;
 pub mod jordan;
