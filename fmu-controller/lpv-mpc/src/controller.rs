@@ -18,6 +18,7 @@ use crate::qp::Problem;
 use crate::recovery::Recovery;
 use crate::sensitivity::{self, Snapshot};
 use crate::signals::{Inputs, Output};
+use crate::trend::Trend;
 use crate::{Error, Parameters};
 
 /// Fraction of a period by which times may differ and still be one: importers add up steps in floating point.
@@ -199,20 +200,20 @@ impl Controller {
         self.snapshot.estimator.clone_from(&self.estimator);
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
         (self.snapshot.tyres[0], self.snapshot.memory) = (*self.beliefs.tyres.present(), self.beliefs.tyres.memory());
-        let (x, disturbance, complete) = self.estimate(inputs, duration, &delivered);
+        let (x, trend, complete) = self.estimate(inputs, duration, &delivered);
         let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
         let road = inputs.road(p);
         tyres.observe(&x, &delivered, road.friction(0.0));
         self.snapshot.tyres[1] = *tyres.present();
-        let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &disturbance);
+        let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &trend);
         let u_prev = self.u_prev;
-        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &disturbance);
+        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &trend);
         let recovery = Recovery::new(&at, road.friction(at.distance), p);
         let guide = recovery.iter().fold(guide, |guide, recovery| guide.no_faster_than(recovery.pace));
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
         let (status, command) = with_mpc!(core, mpc => {
-            let outcome = mpc.step(&at, &u_prev, (&guide, recovery.as_ref()), &hold, body, tyres, &disturbance);
+            let outcome = mpc.step(&at, &u_prev, (&guide, recovery.as_ref()), &hold, body, tyres);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
             if mpc.plan.is_left() && sighted {
                 (Status::of(outcome, complete), mpc.plan.u[0])
@@ -248,11 +249,11 @@ impl Controller {
         ))
     }
 
-    /// State and disturbance at the measurement, and whether all of it was measured.
-    fn estimate(&mut self, inputs: &Inputs, duration: f64, delivered: &Input) -> (State, Disturbance, bool) {
+    /// State and unexplained accelerations at the measurement, and whether all of it was measured.
+    fn estimate(&mut self, inputs: &Inputs, duration: f64, delivered: &Input) -> (State, Trend, bool) {
         let mut measured = inputs.state();
         if self.parameters.estimation == Estimation::Measured {
-            return (measured, Disturbance::zeros(), true);
+            return (measured, Trend::steady(Disturbance::zeros()), true);
         }
         let usable = |i: usize| measured[i].is_finite();
         self.blind = if usable(V_X) && usable(E_Y) && usable(E_PSI) { 0 } else { self.blind + 1 };
@@ -265,7 +266,7 @@ impl Controller {
             // Some importers show zeros until the first exchange of values: a plan for a car at rest serves no moving one.
             with_mpc!(&mut self.core, mpc => mpc.forget());
         }
-        (self.estimator.x, self.estimator.disturbance, complete)
+        (self.estimator.x, self.estimator.trend, complete)
     }
 
     fn publish(&mut self, status: Status) {

@@ -2,7 +2,7 @@
 //!
 //! The vehicle states are augmented by three accelerations that the model cannot explain, on `v_x`, `v_y` and `yaw_rate`,
 //! each a random walk: wind, grade, bank, a steering offset and tyres that differ from the nominal ones all show there. The
-//! plan takes the estimate as constant along the horizon, which makes the tracking offset-free. Measurements enter one by
+//! plan takes them on along the horizon, with their [`Trend`], which makes the tracking offset-free. Measurements enter one by
 //! one, so a value that is missing (`v_y` without its sensor) or not finite is left out and the model carries on. So is, once,
 //! a value that no car in the estimated state would show: a second one in a row is believed. Beyond [`JUMP_MAX`] the filter starts
 //! again.
@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::Scalar;
 use crate::discretise::{Hold, discretise};
 use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
+use crate::trend::Trend;
 
 /// States and disturbances.
 const NZ: usize = NX + 3;
@@ -46,13 +47,19 @@ const JUMP_RATE: f64 = 10.0;
 /// assumed reaches it once in twenty measurements, the assumed one never.
 const OUTLIER: f64 = 8.0;
 
+/// Part of the trend by which the filter moves a disturbance on between two measurements [1]: a random walk lags behind a ramp.
+///
+/// Half of it takes the general track from 0.057 to 0.041 cm (root mean square); all of it is no better (0.037 cm against 0.037
+/// where noise is told to be small), and worse under noise (0.50 cm against 0.48).
+const TREND_SHARE: f64 = 0.5;
+
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimator<T: Scalar = f64> {
     /// Estimated state.
     pub x: State<T>,
-    /// Estimated disturbance.
-    pub disturbance: Disturbance<T>,
+    /// Estimated disturbance, and where it is going.
+    pub trend: Trend<T>,
     P: SMatrix<T, NZ, NZ>,
     /// Curvature at the last update [1/m].
     kappa: T,
@@ -69,7 +76,7 @@ impl<T: Scalar> Estimator<T> {
     pub fn new(sensor_noise: f64) -> Self {
         Self {
             x: State::zeros(),
-            disturbance: Disturbance::zeros(),
+            trend: Trend::steady(Disturbance::zeros()),
             P: SMatrix::zeros(),
             kappa: T::zero(),
             started: false,
@@ -91,6 +98,7 @@ impl<T: Scalar> Estimator<T> {
         body: &Body,
         tyres: &Tyres<T>,
     ) -> bool {
+        let disturbance = self.trend.now;
         let kappa = if kappa.re().is_finite() { kappa } else { self.kappa };
         if !self.started {
             self.start(measured);
@@ -111,6 +119,9 @@ impl<T: Scalar> Estimator<T> {
                 self.correct(i, *z);
             }
         }
+        if duration > 0.0 && !restarts {
+            self.trend.follow(&disturbance, duration);
+        }
         restarts
     }
 
@@ -121,7 +132,7 @@ impl<T: Scalar> Estimator<T> {
     {
         Estimator {
             x: self.x.map(Into::into),
-            disturbance: self.disturbance.map(Into::into),
+            trend: self.trend.map(Into::into),
             P: self.P.map(Into::into),
             kappa: self.kappa.into(),
             started: self.started,
@@ -143,7 +154,7 @@ impl<T: Scalar> Estimator<T> {
             return false;
         }
         self.started = true;
-        self.disturbance = Disturbance::zeros();
+        self.trend = Trend::steady(Disturbance::zeros());
         self.x = measured.map(|z| if z.re().is_finite() { z } else { T::zero() });
         let mut deviation = SVector::<f64, NZ>::zeros();
         for i in 0..NX {
@@ -162,7 +173,7 @@ impl<T: Scalar> Estimator<T> {
         let hold = Hold::new(duration, [0.0, 0.0]);
         let input = input.map(T::from);
         let move_on = |x: &State<T>| {
-            let at = discretise(&embed(x, &input, kappa, body, tyres, &self.disturbance), &hold);
+            let at = discretise(&embed(x, &input, kappa, body, tyres, &self.trend.now), &hold);
             (at.Phi * self.x + at.Gamma * input + at.d, at)
         };
         // Scheduled in the middle of the step, as the stages of the plan are.
@@ -186,6 +197,7 @@ impl<T: Scalar> Estimator<T> {
             self.P[(i, i)] += T::from(intensity * intensity * duration);
         }
         self.x = x;
+        self.trend.now = self.trend.after(TREND_SHARE * duration);
     }
 
     fn is_outlier(&self, i: usize, z: T) -> bool {
@@ -205,7 +217,7 @@ impl<T: Scalar> Estimator<T> {
             self.x[k] += gain[k] * innovation;
         }
         for k in 0..3 {
-            self.disturbance[k] += gain[NX + k] * innovation;
+            self.trend.now[k] += gain[NX + k] * innovation;
         }
         self.P -= gain * column.transpose();
     }

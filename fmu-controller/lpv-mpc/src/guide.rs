@@ -1,4 +1,5 @@
-//! What the plan shall follow: the path under each of its stages, and a speed that the car can drive there.
+//! What the plan meets: the path under each of its stages, a speed that the car can drive there, and the accelerations that the
+//! model cannot explain.
 //!
 //! The wanted speed is lowered to what grip permits ([`crate::ahead`]), and to what drive and brakes reach from the present
 //! speed. A speed that cannot be reached would be an error that the quadratic programme reduces by other means: through the
@@ -10,10 +11,11 @@ use crate::discretise::Hold;
 use crate::latency::Predicted;
 use crate::model::{A_X, Body, Disturbance, Input, V_GUARD, V_X};
 use crate::parameters::Parameters;
+use crate::trend::{Course, Trend};
 
 /// The path under one stage.
 #[derive(Clone, Copy)]
-pub struct Path<T> {
+pub struct Path<T: Scalar> {
     /// Curvature at the beginning and at the end of the stage [1/m].
     pub kappa: [T; 2],
     /// Friction in the middle of the stage [1].
@@ -22,11 +24,13 @@ pub struct Path<T> {
     pub wanted: T,
     /// Speed to be followed at the end of the stage [m/s].
     pub v_x: T,
+    /// Acceleration that the model cannot explain, in the middle of the stage.
+    pub disturbance: Disturbance<T>,
 }
 
 /// Goes along the road with the plan, one stage after the other.
 #[derive(Clone)]
-pub struct Guide<'a, T> {
+pub struct Guide<'a, T: Scalar> {
     road: &'a Road<T>,
     /// Distance of the stage's beginning [m], and the preview's element before it.
     s: T,
@@ -40,6 +44,7 @@ pub struct Guide<'a, T> {
     pace: f64,
     /// The fastest and the slowest that the car can be.
     reach: [Reach<T>; 2],
+    course: Course<T>,
     period: f64,
 }
 
@@ -82,7 +87,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
         u_prev: &Input,
         latency: f64,
         (p, body, hold): (&Parameters, &Body, &Hold),
-        disturbance: &Disturbance<T>,
+        trend: &Trend<T>,
     ) -> Self {
         let ratio = at.x[V_X] / at.x[V_X].larger(V_GUARD);
         let reach = [p.a_x_max, p.a_x_min].map(|bound| Reach {
@@ -92,13 +97,23 @@ impl<'a, T: Scalar> Guide<'a, T> {
             bound,
             step: p.a_x_rate_max * p.t_s,
             decay: hold.decay[A_X],
-            free: disturbance[0] - ratio * body.rolling,
+            free: trend.now[0] - ratio * body.rolling,
             drag: body.drag / body.m,
         });
         let place = road.find(at.distance, 0);
         let (kappa, mu, _) = road.at(&place);
-        let pace = f64::INFINITY;
-        Self { road, s: at.distance, before: place.before(), kappa, mu, time: latency, pace, reach, period: p.t_s }
+        Self {
+            road,
+            s: at.distance,
+            before: place.before(),
+            kappa,
+            mu,
+            time: latency,
+            pace: f64::INFINITY,
+            reach,
+            course: trend.along(latency, p.t_s),
+            period: p.t_s,
+        }
     }
 
     /// The same, no faster than `pace` [m/s].
@@ -130,7 +145,8 @@ impl<'a, T: Scalar> Guide<'a, T> {
         } else {
             permitted
         };
-        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, wanted, v_x };
+        let disturbance = self.course.advance();
+        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, wanted, v_x, disturbance };
         (self.kappa, self.mu) = (kappa, mu);
         path
     }
@@ -147,7 +163,7 @@ mod tests {
         let at = Predicted { x: State::from([20.0, 0.0, 0.0, 0.0, 0.0]), distance: 0.0, actual: Input::zeros() };
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
         let given = (p, &p.body(), &hold);
-        let mut guide = Guide::new(&road, &at, &Input::zeros(), 0.0, given, &Disturbance::zeros());
+        let mut guide = Guide::new(&road, &at, &Input::zeros(), 0.0, given, &Trend::steady(Disturbance::zeros()));
         (0..stages).map(|_| guide.advance(|_| 20.0).v_x).collect()
     }
 

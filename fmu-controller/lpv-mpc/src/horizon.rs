@@ -7,8 +7,7 @@ use crate::discretise::{Discrete, Hold, discretise};
 use crate::guide::Path;
 use crate::latency::Predicted;
 use crate::model::{
-    A_X, Body, DELTA, Disturbance, E_PSI, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed,
-    steady_lateral_velocity,
+    A_X, Body, DELTA, E_PSI, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed, steady_lateral_velocity,
 };
 use crate::qp::Stage;
 
@@ -16,15 +15,13 @@ use crate::qp::Stage;
 pub const NX_LAGS: usize = NX + NU;
 
 /// What is the same for every stage of a plan.
-pub struct Surroundings<'a, T> {
+pub struct Surroundings<'a> {
     /// The car.
     pub body: &'a Body,
     /// Tyres at small slip, for the reference.
     pub nominal: Tyres,
     /// Period and lags.
     pub hold: &'a Hold,
-    /// Accelerations that the model cannot explain.
-    pub disturbance: Disturbance<T>,
 }
 
 /// One stage of the quadratic programme, `x+ = A x + B u + d` with the reference of `x+`.
@@ -63,11 +60,11 @@ pub fn linearise<T: Scalar, const N_X: usize>(
     (x, u): &(State<T>, Input<T>),
     path: &Path<T>,
     tyres: &Tyres<T>,
-    around: &Surroundings<'_, T>,
+    around: &Surroundings<'_>,
 ) -> Linear<T, N_X> {
-    let Surroundings { body, nominal, hold, disturbance } = around;
+    let Surroundings { body, nominal, hold } = around;
     let kappa = (path.kappa[0] + path.kappa[1]) * 0.5;
-    let sample = discretise(&embed(x, u, kappa, body, tyres, disturbance), hold);
+    let sample = discretise(&embed(x, u, kappa, body, tyres, &path.disturbance), hold);
     let (A, B) = behind_lags(&sample, hold);
     let mut d = SVector::<T, N_X>::zeros();
     d.fixed_rows_mut::<NX>(0).copy_from(&sample.d);

@@ -7,7 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::model::{A_X, Body, DELTA, Disturbance, Input, NU, State, Tyres, V_X, derivative, fastest_rate, progress};
+use crate::model::{A_X, Body, DELTA, Input, NU, State, Tyres, V_X, derivative, fastest_rate, progress};
+use crate::trend::Trend;
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
 /// that mode, and far less of the slow ones that carry the car.
@@ -113,7 +114,7 @@ impl Latency {
         kappa: impl Fn(T) -> T,
         body: &Body,
         tyres: &Tyres<T>,
-        disturbance: &Disturbance<T>,
+        trend: &Trend<T>,
     ) -> Predicted<T> {
         let end = self.time + step + self.delay;
         let rate = fastest_rate(x[V_X].re(), body, tyres);
@@ -126,9 +127,10 @@ impl Latency {
             let h = piece / steps;
             let mut done = 0.0;
             while done < steps {
+                let disturbance = trend.after(now - self.time + (done + 0.5) * h);
                 let f = |x: &State<T>, u: &Input, distance: T| {
                     let kappa = kappa(distance);
-                    (derivative(x, &u.map(T::from), kappa, body, tyres, disturbance), progress(x, kappa))
+                    (derivative(x, &u.map(T::from), kappa, body, tyres, &disturbance), progress(x, kappa))
                 };
                 at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;
@@ -184,11 +186,12 @@ fn lag(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Input {
 mod tests {
     use super::*;
     use crate::Parameters;
+    use crate::model::Disturbance;
 
     fn predict(latency: &Latency, step: f64) -> Predicted {
         let p = Parameters::default();
         let x = State::from([15.0, 0.1, 0.05, 0.2, 0.02]);
-        latency.predict(&x, step, |_| 0.01, &p.body(), &p.nominal_tyres(), &Disturbance::zeros())
+        latency.predict(&x, step, |_| 0.01, &p.body(), &p.nominal_tyres(), &Trend::steady(Disturbance::zeros()))
     }
 
     #[test]
@@ -220,9 +223,10 @@ mod tests {
             |_| 0.01,
             &p.body(),
             &p.nominal_tyres(),
-            &Disturbance::zeros(),
+            &Trend::steady(Disturbance::zeros()),
         );
-        let rest = later.predict(&half.x, 0.0, |_| 0.01, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
+        let rest =
+            later.predict(&half.x, 0.0, |_| 0.01, &p.body(), &p.nominal_tyres(), &Trend::steady(Disturbance::zeros()));
         assert!((rest.x - whole.x).norm() < 1e-12, "{} {}", rest.x, whole.x);
         assert!((rest.actual - whole.actual).norm() < 1e-12);
     }
@@ -257,7 +261,7 @@ mod tests {
         let mut latency = Latency::new(0.0, 0.0, [0.0, 0.3], 0.033);
         latency.send(0.0, Input::from([0.0, 2.0]));
         let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
-        let at = latency.predict(&x, 0.2, |_| 0.0, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
+        let at = latency.predict(&x, 0.2, |_| 0.0, &p.body(), &p.nominal_tyres(), &Trend::steady(Disturbance::zeros()));
         let expected = 15.0 + 2.0 * (0.2 - 0.3 * (1.0 - (-0.2f64 / 0.3).exp()));
         // Simpson's rule on an exponential, 40 ms steps: (h / tau)^4 / 2880 of the 0.4 m/s.
         assert!((at.x[0] - expected).abs() < 1e-7, "{} {expected}", at.x[0]);

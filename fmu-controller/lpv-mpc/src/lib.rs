@@ -44,6 +44,7 @@ mod scalar;
 mod sensitivity;
 pub mod signals;
 mod terminal;
+pub mod trend;
 
 pub use controller::Controller;
 pub use error::Error;

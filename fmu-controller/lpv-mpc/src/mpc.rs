@@ -12,7 +12,7 @@ use crate::discretise::Hold;
 use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
+use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
 use crate::modes::Backend;
 use crate::plan::Plan;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
@@ -137,7 +137,6 @@ impl<const N_X: usize> Mpc<N_X> {
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
-        disturbance: &Disturbance,
     ) -> Outcome {
         let continues = self.plan.is_left();
         self.problem.x_0 = full_state(at);
@@ -162,7 +161,7 @@ impl<const N_X: usize> Mpc<N_X> {
             if !continues {
                 self.schedule.forget();
             }
-            self.model((guide.clone(), recovery), hold, body, tyres, disturbance);
+            self.model((guide.clone(), recovery), hold, body, tyres);
             if !self.solve() {
                 break;
             }
@@ -212,9 +211,8 @@ impl<const N_X: usize> Mpc<N_X> {
         hold: &Hold,
         body: &Body,
         tyres: &mut impl TyreModel,
-        disturbance: &Disturbance,
     ) {
-        let around = Surroundings { body, nominal: tyres.nominal(), hold, disturbance: *disturbance };
+        let around = Surroundings { body, nominal: tyres.nominal(), hold };
         tyres.restart();
         self.fastest = 0.0;
         self.schedule.take(&self.plan);

@@ -21,6 +21,7 @@ use crate::modes::Estimation;
 use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::HORIZON_MAX;
 use crate::qp::{Perturbation, Stage};
+use crate::trend::Trend;
 use crate::{Inputs, Output, Parameters};
 
 /// What the last sample started from.
@@ -59,11 +60,11 @@ impl Snapshot {
         }
     }
 
-    /// Estimated state and disturbance.
-    fn estimate(&self, direction: &Inputs, p: &Parameters, body: &Body) -> (State<Dual64>, Disturbance<Dual64>) {
+    /// Estimated state and unexplained accelerations.
+    fn estimate(&self, direction: &Inputs, p: &Parameters, body: &Body) -> (State<Dual64>, Trend<Dual64>) {
         let mut measured = self.inputs.state().zip_map(&direction.state(), dual);
         if p.estimation == Estimation::Measured {
-            return (measured, Disturbance::zeros());
+            return (measured, Trend::steady(Disturbance::zeros()));
         }
         if !p.v_y_measured {
             measured[V_Y] = Dual64::from(f64::NAN);
@@ -72,7 +73,7 @@ impl Snapshot {
         let mut estimator = self.estimator.to_dual();
         let tyres = fixed(&self.tyres[0]);
         estimator.update(&measured, kappa, &self.delivered, self.duration, body, &tyres);
-        (estimator.x, estimator.disturbance)
+        (estimator.x, estimator.trend)
     }
 }
 
@@ -94,7 +95,7 @@ pub(crate) fn along<const N_X: usize>(
         return None;
     }
     let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
-    let (x, disturbance) = snapshot.estimate(direction, p, body);
+    let (x, trend) = snapshot.estimate(direction, p, body);
     let road = snapshot.inputs.road_along(direction, p);
     let mu = road.friction(Dual64::from(0.0));
     let mut neighbours = adapter.neighbours(snapshot.memory, &x, &snapshot.delivered, mu);
@@ -102,10 +103,10 @@ pub(crate) fn along<const N_X: usize>(
         Some(neighbours) => neighbours.present(&snapshot.tyres[1]),
         None => fixed(&snapshot.tyres[1]),
     };
-    let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &disturbance);
+    let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &trend);
     let since = snapshot.step + p.input_delay;
-    let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, &hold), &disturbance);
-    let around = Surroundings { body, nominal: adapter.nominal(), hold: &hold, disturbance };
+    let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, &hold), &trend);
+    let around = Surroundings { body, nominal: adapter.nominal(), hold: &hold };
 
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);

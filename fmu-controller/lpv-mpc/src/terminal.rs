@@ -59,8 +59,8 @@ impl Terminal {
         if self.cost == TerminalCost::StageWeights || (v_x - self.v_x).abs() <= SAME_SPEED * self.v_x {
             return;
         }
-        let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x };
-        let around = Surroundings { body, nominal: *tyres, hold, disturbance: Disturbance::zeros() };
+        let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x, disturbance: Disturbance::zeros() };
+        let around = Surroundings { body, nominal: *tyres, hold };
         let mut x = State::zeros();
         x[V_X] = v_x;
         let end = linearise::<f64, N_X>(&(x, Input::zeros()), &straight, tyres, &around);
