@@ -1,8 +1,9 @@
 //! From the continuous LPV system to one sample: zero-order hold, with first-order lags of the actuators held exactly.
 //!
 //! The paper steps with `x + A x + B u dt` (a misprint of Euler's rule, which is itself unstable below about 2.4 m/s). Here
-//! the matrix exponential is a fourth-order Taylor series, evaluated by Horner's rule on the three columns that are not
-//! known beforehand; a dense evaluation costs more than the quadratic programme it feeds.
+//! the matrix exponential is a fourth-order Taylor series, evaluated on the three columns that are not known beforehand; a
+//! dense evaluation costs more than the quadratic programme it feeds. The powers of the matrix serve the commands and the
+//! lags alike.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -28,24 +29,24 @@ pub struct Hold {
     tau: [f64; NU],
     /// What is left of a lag's distance to its command after the step [1].
     pub decay: [f64; NU],
-    /// First moment of the decaying distance, and the ratios of the following ones.
+    /// Moments of the decaying distance.
     moments: [[f64; ORDER]; NU],
 }
 
 impl Hold {
     /// A hold over `step` [s] behind lags with time constants `tau` [s]; 0 is no lag.
     pub fn new(step: f64, tau: [f64; NU]) -> Self {
-        Self { step, tau, decay: tau.map(|tau| decay(step, tau)), moments: tau.map(|tau| moment_ratios(step, tau)) }
+        Self { step, tau, decay: tau.map(|tau| decay(step, tau)), moments: tau.map(|tau| moments(step, tau)) }
     }
 }
 
 /// `exp(-step / tau)`, 0 without a lag.
-fn decay(step: f64, tau: f64) -> f64 {
+pub(crate) fn decay(step: f64, tau: f64) -> f64 {
     if tau > 0.0 { (-step / tau).exp() } else { 0.0 }
 }
 
-/// The moments `m_k = integral of (h - s)^k / k! exp(-s / tau)` as first value and ratios `m_k / m_(k-1)`.
-fn moment_ratios(step: f64, tau: f64) -> [f64; ORDER] {
+/// The moments `m_k = integral of (h - s)^k / k! exp(-s / tau)`.
+fn moments(step: f64, tau: f64) -> [f64; ORDER] {
     if tau <= 0.0 {
         return [0.0; ORDER];
     }
@@ -71,7 +72,7 @@ fn moment_ratios(step: f64, tau: f64) -> [f64; ORDER] {
             moments[k] = tau * (power - moments[k - 1]);
         }
     }
-    [moments[0], moments[1] / moments[0], moments[2] / moments[1], moments[3] / moments[2]]
+    moments
 }
 
 /// One sample: `x+ = Phi x + Gamma u + Lag (a - u) + d`, where `a` is what the actuators deliver at the start.
@@ -133,12 +134,6 @@ impl<T: Scalar> Columns<T> {
         }
     }
 
-    #[inline(always)]
-    fn scaled(self, factor: f64) -> Self {
-        let factor = T::from(factor);
-        Self { v_x: self.v_x * factor, lateral: self.lateral.map(|row| row * factor) }
-    }
-
     /// The columns plus those of the identity.
     #[inline(always)]
     fn plus_identity(mut self) -> Self {
@@ -148,14 +143,19 @@ impl<T: Scalar> Columns<T> {
         self
     }
 
-    /// `w_0 (I + w_1 A (I + w_2 A (I + w_3 A)))`.
+    /// `w_0 I + w_1 A + w_2 A^2 + w_3 A^3` from the powers of `A`.
     #[inline(always)]
-    fn series(A: &SMatrix<T, NX, NX>, weights: &[f64; ORDER]) -> Self {
-        let mut columns = Self::of(A).scaled(weights[ORDER - 1]).plus_identity();
-        for k in (1..ORDER - 1).rev() {
-            columns = columns.multiplied(A).scaled(weights[k]).plus_identity();
-        }
-        columns.scaled(weights[0])
+    fn series(powers: &[Self; ORDER - 1], weights: &[f64; ORDER]) -> Self {
+        let w = weights.map(T::from);
+        let [a, b, c] = powers;
+        let mut sum = Self {
+            v_x: a.v_x * w[1] + b.v_x * w[2] + c.v_x * w[3],
+            lateral: std::array::from_fn(|i| a.lateral[i] * w[1] + b.lateral[i] * w[2] + c.lateral[i] * w[3]),
+        };
+        sum.v_x[V_X] += w[0];
+        sum.lateral[V_Y][0] += w[0];
+        sum.lateral[YAW_RATE][1] += w[0];
+        sum
     }
 
     /// The columns times a vector that is zero in the errors on the path.
@@ -167,6 +167,7 @@ impl<T: Scalar> Columns<T> {
 }
 
 /// Discretises the system over a hold.
+#[inline(always)]
 pub fn discretise<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let rate = lpv.A[(V_Y, V_Y)].re().abs().max(lpv.A[(YAW_RATE, YAW_RATE)].re().abs());
     let stiffness = hold.step * rate;
@@ -179,11 +180,16 @@ pub fn discretise<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
 }
 
 /// The series over the whole hold.
+#[inline(always)]
 fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let Lpv { A, B, d } = lpv;
     let h = hold.step;
+    let first = Columns::of(A);
+    let second = first.multiplied(A);
+    let third = second.multiplied(A);
+    let powers = [first, second, third];
     // Columns of the integral of the exponential: everything the inputs and the affine term excite lies in their span.
-    let Psi = Columns::series(A, &[h, h / 2.0, h / 3.0, h / 4.0]);
+    let Psi = Columns::series(&powers, &[h, h * h / 2.0, h * h * h / 6.0, h * h * h * h / 24.0]);
 
     let moved = Psi.multiplied(A).plus_identity();
     let mut Phi = SMatrix::<T, NX, NX>::identity();
@@ -198,10 +204,10 @@ fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let b_delta = [B[(V_X, DELTA)], B[(V_Y, DELTA)], B[(YAW_RATE, DELTA)]];
     let mut Lag = SMatrix::<T, NX, NU>::zeros();
     if hold.tau[DELTA] > 0.0 {
-        Lag.set_column(DELTA, &Columns::series(A, &hold.moments[DELTA]).combine(b_delta));
+        Lag.set_column(DELTA, &Columns::series(&powers, &hold.moments[DELTA]).combine(b_delta));
     }
     if hold.tau[A_X] > 0.0 {
-        Lag.set_column(A_X, &Columns::series(A, &hold.moments[A_X]).v_x);
+        Lag.set_column(A_X, &Columns::series(&powers, &hold.moments[A_X]).v_x);
     }
     Discrete {
         Phi,
@@ -212,6 +218,7 @@ fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
 }
 
 /// The hold cut into equal pieces and put together again, for modes too fast for the series.
+#[cold]
 fn compose<T: Scalar>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) -> Discrete<T> {
     let short = Hold::new(hold.step / f64::from(pieces), hold.tau);
     let piece = one_piece(lpv, &short);

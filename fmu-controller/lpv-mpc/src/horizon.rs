@@ -7,7 +7,8 @@ use crate::discretise::{Discrete, Hold, discretise};
 use crate::guide::Path;
 use crate::latency::Predicted;
 use crate::model::{
-    A_X, Body, DELTA, E_PSI, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed, steady_lateral_velocity,
+    A_X, Body, DELTA, E_PSI, Input, NU, NX, Point, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed_at,
+    steady_lateral_velocity,
 };
 use crate::qp::Stage;
 
@@ -45,26 +46,28 @@ impl<const N_X: usize> From<Linear<f64, N_X>> for Stage<N_X, NU> {
 /// Where a stage is linearised: in the middle between its nodes, at the angle and acceleration that the actuators deliver.
 ///
 /// The frozen system then is a second-order approximation of the varying one.
+#[inline(always)]
 pub fn middle<T: Scalar, const N_X: usize>(
     before: &SVector<T, N_X>,
     after: &SVector<T, N_X>,
     u: &Input<T>,
-) -> (State<T>, Input<T>) {
+) -> Point<T> {
     let middle = (before + after) * T::from(0.5);
     let acting = if N_X == NX { *u } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
-    (vehicle_part(&middle), acting)
+    Point::new(vehicle_part(&middle), acting)
 }
 
 /// The stage at a scheduling point.
+#[inline(always)]
 pub fn linearise<T: Scalar, const N_X: usize>(
-    (x, u): &(State<T>, Input<T>),
+    at: &Point<T>,
     path: &Path<T>,
     tyres: &Tyres<T>,
     around: &Surroundings<'_>,
 ) -> Linear<T, N_X> {
     let Surroundings { body, nominal, hold } = around;
     let kappa = (path.kappa[0] + path.kappa[1]) * 0.5;
-    let sample = discretise(&embed(x, u, kappa, body, tyres, &path.disturbance), hold);
+    let sample = discretise(&embed_at(at, kappa, body, tyres, &path.disturbance), hold);
     let (A, B) = behind_lags(&sample, hold);
     let mut d = SVector::<T, N_X>::zeros();
     d.fixed_rows_mut::<NX>(0).copy_from(&sample.d);
@@ -72,6 +75,7 @@ pub fn linearise<T: Scalar, const N_X: usize>(
 }
 
 /// System and input matrix, with the actuators as states when there is room for them.
+#[inline(always)]
 fn behind_lags<T: Scalar, const N_X: usize>(
     sample: &Discrete<T>,
     hold: &Hold,

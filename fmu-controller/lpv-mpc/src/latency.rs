@@ -7,7 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::model::{A_X, Body, DELTA, Input, NU, State, Tyres, V_X, derivative, fastest_rate, progress};
+use crate::discretise::decay;
+use crate::model::{Body, Input, NU, Point, State, Tyres, V_X, fastest_rate, motion};
 use crate::trend::Trend;
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
@@ -130,7 +131,7 @@ impl Latency {
                 let disturbance = trend.after(now - self.time + (done + 0.5) * h);
                 let f = |x: &State<T>, u: &Input, distance: T| {
                     let kappa = kappa(distance);
-                    (derivative(x, &u.map(T::from), kappa, body, tyres, &disturbance), progress(x, kappa))
+                    motion(&Point::new(*x, u.map(T::from)), kappa, body, tyres, &disturbance)
                 };
                 at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;
@@ -148,10 +149,11 @@ impl Latency {
         h: f64,
         f: impl Fn(&State<T>, &Input, T) -> (State<T>, T),
     ) -> Predicted<T> {
-        let middle = lag(&at.actual, command, h / 2.0, &self.tau);
-        let end = lag(&at.actual, command, h, &self.tau);
+        let left = self.tau.map(|tau| decay(h / 2.0, tau));
+        let middle = follow(&at.actual, command, left);
+        let end = follow(&at.actual, command, left.map(|left| left * left));
         // Without a lag the command acts from the first moment on.
-        let start = lag(&at.actual, command, 0.0, &self.tau);
+        let start = follow(&at.actual, command, self.tau.map(|tau| if tau > 0.0 { 1.0 } else { 0.0 }));
         let rate =
             |slope: (State<T>, T), h: f64, u: &Input| f(&(at.x + slope.0 * T::from(h)), u, at.distance + slope.1 * h);
         let k1 = f(&at.x, &start, at.distance);
@@ -176,10 +178,12 @@ fn lag_integral(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Inp
 
 /// First-order lags over `h` [s], exact for a held command.
 fn lag(actual: &Input, command: &Input, h: f64, tau: &[f64; NU]) -> Input {
-    let follow = |j: usize| {
-        if tau[j] > 0.0 { command[j] + (actual[j] - command[j]) * (-h / tau[j]).exp() } else { command[j] }
-    };
-    Input::from([follow(DELTA), follow(A_X)])
+    follow(actual, command, tau.map(|tau| decay(h, tau)))
+}
+
+/// Lags after a while that leaves these shares of their distances to the command.
+fn follow(actual: &Input, command: &Input, left: [f64; NU]) -> Input {
+    Input::from_fn(|j, _| command[j] + (actual[j] - command[j]) * left[j])
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@
 
 pub mod adaptation;
 mod ahead;
+mod angles;
 pub mod controller;
 pub mod discretise;
 mod error;

@@ -9,6 +9,7 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
+use crate::angles::{Angle, angles, atan_ratios, atans};
 
 /// Number of vehicle states.
 pub const NX: usize = 5;
@@ -113,28 +114,52 @@ fn guarded<T: Scalar>(v_x: T) -> (T, T) {
     (v, v_x / v)
 }
 
+/// A state and an input with the sines and cosines of their angles, which cost as much as the rest of the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point<T = f64> {
+    /// State.
+    pub x: State<T>,
+    /// Input.
+    pub u: Input<T>,
+    delta: Angle<T>,
+    e_psi: Angle<T>,
+}
+
+impl<T: Scalar> Point<T> {
+    /// The point of a state and an input.
+    #[inline(always)]
+    pub fn new(x: State<T>, u: Input<T>) -> Self {
+        let [delta, e_psi] = angles([u[DELTA], x[E_PSI]]);
+        Self { x, u, delta, e_psi }
+    }
+
+    /// Progress along the path [m/s], `s'` of [Kebbati, eq. (1)].
+    #[inline(always)]
+    pub fn progress(&self, kappa: T) -> T {
+        (self.x[V_X] * self.e_psi.cos - self.x[V_Y] * self.e_psi.sin) / path_factor(kappa, self.x[E_Y])
+    }
+}
+
 /// `1 - kappa e_y`, held away from zero.
 fn path_factor<T: Scalar>(kappa: T, e_y: T) -> T {
     (-kappa * e_y + 1.0).larger(PATH_FACTOR_MIN)
 }
 
 /// Front and rear slip angles [rad], [Kebbati, eq. (2)] with the signs of the yaw terms corrected.
+#[inline]
 pub fn slip_angles<T: Scalar>(x: &State<T>, delta: T, body: &Body) -> (T, T) {
     let (v, ratio) = guarded(x[V_X]);
-    let (z_f, z_r) = ((x[V_Y] + x[YAW_RATE] * body.l_f) / v, (x[V_Y] - x[YAW_RATE] * body.l_r) / v);
-    (delta * ratio - z_f * atan_ratio(z_f), -z_r * atan_ratio(z_r))
-}
-
-/// Progress along the path [m/s], `s'` of [Kebbati, eq. (1)].
-pub fn progress<T: Scalar>(x: &State<T>, kappa: T) -> T {
-    let (s_psi, c_psi) = x[E_PSI].sin_cos();
-    (x[V_X] * c_psi - x[V_Y] * s_psi) / path_factor(kappa, x[E_Y])
+    let per_v = v.recip();
+    let [drift_f, drift_r] =
+        atans([(x[V_Y] + x[YAW_RATE] * body.l_f) * per_v, (x[V_Y] - x[YAW_RATE] * body.l_r) * per_v]);
+    (delta * ratio - drift_f, -drift_r)
 }
 
 /// Right-hand side of the prediction model, [Kebbati, eq. (1)] corrected.
 ///
 /// Differs from the printed equations in the signs of the slip angles, the factor `kappa` and the signs in `e_psi'`, and
 /// rolling resistance that is `c_rr m g` instead of the tyre's friction times the weight.
+#[inline]
 pub fn derivative<T: Scalar>(
     x: &State<T>,
     u: &Input<T>,
@@ -143,46 +168,37 @@ pub fn derivative<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> State<T> {
-    let [v_x, v_y, yaw_rate, _, e_psi] = (*x).into();
+    motion(&Point::new(*x, *u), kappa, body, tyres, disturbance).0
+}
+
+/// [`derivative`] at a point, and the progress along the path [m/s].
+#[inline(always)]
+pub fn motion<T: Scalar>(
+    at: &Point<T>,
+    kappa: T,
+    body: &Body,
+    tyres: &Tyres<T>,
+    disturbance: &Disturbance<T>,
+) -> (State<T>, T) {
+    let [v_x, v_y, yaw_rate, _, _] = at.x.into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
+    let (per_m, per_i) = (m.recip(), i_z.recip());
     let (_, ratio) = guarded(v_x);
-    let (alpha_f, alpha_r) = slip_angles(x, u[DELTA], body);
+    let (alpha_f, alpha_r) = slip_angles(&at.x, at.u[DELTA], body);
     let f_yf = alpha_f * tyres.c_f + tyres.f_f0;
     let f_yr = alpha_r * tyres.c_r + tyres.f_r0;
-    let (s, c) = u[DELTA].sin_cos();
-    let (s_psi, c_psi) = e_psi.sin_cos();
+    let (Angle { sin: s, cos: c, .. }, Angle { sin: s_psi, cos: c_psi, .. }) = (at.delta, at.e_psi);
+    let progress = at.progress(kappa);
 
-    State::from([
-        u[A_X] + yaw_rate * v_y - f_yf * s / m - ratio * rolling - v_x.abs() * v_x * drag / m + disturbance[0],
-        (f_yf * c + f_yr) / m - yaw_rate * v_x + disturbance[1],
-        (f_yf * c * l_f - f_yr * l_r) / i_z + disturbance[2],
+    let rate = State::from([
+        at.u[A_X] + yaw_rate * v_y - f_yf * s * per_m - ratio * rolling - v_x.abs() * v_x * (drag * per_m)
+            + disturbance[0],
+        (f_yf * c + f_yr) * per_m - yaw_rate * v_x + disturbance[1],
+        (f_yf * c * l_f - f_yr * l_r) * per_i + disturbance[2],
         v_x * s_psi + v_y * c_psi,
-        yaw_rate - kappa * progress(x, kappa),
-    ])
-}
-
-/// Up to here Taylor's series of [`atan_ratio`] is exact: its first neglected term, z^18 / 19, is under the rounding of 1.
-const ATAN_SERIES_MAX: f64 = 0.15;
-
-/// `atan(z) / z`, 1 at zero.
-///
-/// Cars slip by a few degrees, so it is mostly the series, which costs a fifth of the library's function and a division.
-fn atan_ratio<T: Scalar>(z: T) -> T {
-    if z.re().abs() > ATAN_SERIES_MAX {
-        return z.atan() / z;
-    }
-    let square = z * z;
-    let mut sum = T::from(1.0 / 17.0);
-    for denominator in [15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
-        sum = sum * -square + 1.0 / denominator;
-    }
-    sum
-}
-
-/// `sin(x) / x` from the sine of `x`, 1 at zero.
-fn sinc<T: Scalar>(x: T, sin_x: T) -> T {
-    // Below 1e-4 the first neglected term of the series, x^4 / 120, is under the rounding of 1.
-    if x.re().abs() < 1e-4 { -x * x / 6.0 + 1.0 } else { sin_x / x }
+        yaw_rate - kappa * progress,
+    ]);
+    (rate, progress)
 }
 
 /// The LPV embedding at the scheduling point `(x, u, kappa)`, [Kebbati, eqs. (6) to (8)] corrected.
@@ -190,6 +206,7 @@ fn sinc<T: Scalar>(x: T, sin_x: T) -> T {
 /// Exact: `A x + B u + d` at the scheduling point equals [`derivative`]. Differs from the printed matrices in the signs of
 /// `A52`, `B21`, `B31` and of the rear term in `A32`, in the misplaced cosines of `A32` and `A33`, and in the lateral
 /// error's row: the printed `A41 = sin e_psi` with `A45 = 0` makes (A, B) uncontrollable, `A45 = v_x sinc e_psi` does not.
+#[inline]
 pub fn embed<T: Scalar>(
     x: &State<T>,
     u: &Input<T>,
@@ -198,42 +215,58 @@ pub fn embed<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> Lpv<T> {
-    let [v_x, v_y, yaw_rate, e_y, e_psi] = (*x).into();
+    embed_at(&Point::new(*x, *u), kappa, body, tyres, disturbance)
+}
+
+/// [`embed`] at a point.
+#[inline(always)]
+pub fn embed_at<T: Scalar>(
+    at: &Point<T>,
+    kappa: T,
+    body: &Body,
+    tyres: &Tyres<T>,
+    disturbance: &Disturbance<T>,
+) -> Lpv<T> {
+    let [v_x, v_y, yaw_rate, e_y, _] = at.x.into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
     let Tyres { c_f, c_r, f_f0, f_r0 } = *tyres;
+    // Reciprocals once: a division costs five products.
+    let (per_m, per_i) = (m.recip(), i_z.recip());
     let (v, ratio) = guarded(v_x);
-    let (s, c) = u[DELTA].sin_cos();
-    let (s_psi, c_psi) = e_psi.sin_cos();
+    let (Angle { sin: s, cos: c, .. }, Angle { sin: s_psi, cos: c_psi, sinc }) = (at.delta, at.e_psi);
     // Stiffness per metre per second of lateral velocity at the axle.
     let per_v = v.recip();
-    let k_f = atan_ratio((v_y + yaw_rate * l_f) * per_v) * per_v * c_f;
-    let k_r = atan_ratio((v_y - yaw_rate * l_r) * per_v) * per_v * c_r;
+    let [drift_f, drift_r] = atan_ratios([(v_y + yaw_rate * l_f) * per_v, (v_y - yaw_rate * l_r) * per_v]);
+    let (k_f, k_r) = (drift_f * per_v * c_f, drift_r * per_v * c_r);
     let k_path = kappa / path_factor(kappa, e_y);
+    let (k_fs, k_fc) = (k_f * s, k_f * c);
+    let moment = k_fc * l_f - k_r * l_r;
+    let steering = ratio * c_f * per_m;
 
     let mut A = SMatrix::<T, NX, NX>::zeros();
-    A[(V_X, V_X)] = -per_v * rolling - v_x.abs() * (drag / m);
-    A[(V_X, V_Y)] = k_f * s / m;
-    A[(V_X, YAW_RATE)] = k_f * s * (l_f / m) + v_y;
-    A[(V_Y, V_Y)] = -(k_f * c + k_r) / m;
-    A[(V_Y, YAW_RATE)] = -(k_f * c * l_f - k_r * l_r) / m - v_x;
-    A[(YAW_RATE, V_Y)] = -(k_f * c * l_f - k_r * l_r) / i_z;
-    A[(YAW_RATE, YAW_RATE)] = -(k_f * c * (l_f * l_f) + k_r * (l_r * l_r)) / i_z;
+    A[(V_X, V_X)] = -per_v * rolling - v_x.abs() * (drag * per_m);
+    A[(V_X, V_Y)] = k_fs * per_m;
+    A[(V_X, YAW_RATE)] = k_fs * (l_f * per_m) + v_y;
+    A[(V_Y, V_Y)] = -(k_fc + k_r) * per_m;
+    A[(V_Y, YAW_RATE)] = -moment * per_m - v_x;
+    A[(YAW_RATE, V_Y)] = -moment * per_i;
+    A[(YAW_RATE, YAW_RATE)] = -(k_fc * (l_f * l_f) + k_r * (l_r * l_r)) * per_i;
     A[(E_Y, V_Y)] = c_psi;
-    A[(E_Y, E_PSI)] = v_x * sinc(e_psi, s_psi);
+    A[(E_Y, E_PSI)] = v_x * sinc;
     A[(E_PSI, V_X)] = -k_path * c_psi;
     A[(E_PSI, V_Y)] = k_path * s_psi;
     A[(E_PSI, YAW_RATE)] = T::one();
 
     let mut B = SMatrix::<T, NX, NU>::zeros();
-    B[(V_X, DELTA)] = -ratio * s * (c_f / m);
+    B[(V_X, DELTA)] = -steering * s;
     B[(V_X, A_X)] = T::one();
-    B[(V_Y, DELTA)] = ratio * c * (c_f / m);
-    B[(YAW_RATE, DELTA)] = ratio * c * (c_f * l_f / i_z);
+    B[(V_Y, DELTA)] = steering * c;
+    B[(YAW_RATE, DELTA)] = steering * c * (l_f * m * per_i);
 
     let d = State::from([
-        -s * (f_f0 / m) + disturbance[0],
-        (c * f_f0 + f_r0) / m + disturbance[1],
-        (c * (f_f0 * l_f) - f_r0 * l_r) / i_z + disturbance[2],
+        -s * f_f0 * per_m + disturbance[0],
+        (c * f_f0 + f_r0) * per_m + disturbance[1],
+        (c * (f_f0 * l_f) - f_r0 * l_r) * per_i + disturbance[2],
         T::zero(),
         T::zero(),
     ]);
@@ -261,16 +294,6 @@ mod tests {
 
     fn body() -> Body {
         crate::Parameters::default().body()
-    }
-
-    #[test]
-    fn slips_are_those_of_the_arctangent() {
-        for k in -3000..=3000 {
-            let z = f64::from(k) * 1e-4;
-            let got = z * atan_ratio(z);
-            // A dozen roundings of terms that fall by 1/40 from one to the next.
-            assert!((got - z.atan()).abs() <= 4e-16 * z.abs(), "{z}: {got} against {}", z.atan());
-        }
     }
 
     #[test]

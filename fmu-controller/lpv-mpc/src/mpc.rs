@@ -12,7 +12,7 @@ use crate::discretise::Hold;
 use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
 use crate::latency::Predicted;
-use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE, progress};
+use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::modes::Backend;
 use crate::plan::Plan;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
@@ -128,7 +128,6 @@ impl<const N_X: usize> Mpc<N_X> {
     }
 
     /// Plans from the predicted state. Returns what the answer is worth; the plan is in place when there is one.
-    #[expect(clippy::too_many_arguments, reason = "the measured situation and the beliefs, each of its own kind")]
     pub fn step(
         &mut self,
         at: &Predicted,
@@ -218,8 +217,8 @@ impl<const N_X: usize> Mpc<N_X> {
         self.schedule.take(&self.plan);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
-            let path = guide.advance(|kappa| progress(&at.0, kappa));
-            self.tyres[i] = tyres.at(&at.0, &at.1, path.mu);
+            let path = guide.advance(|kappa| at.progress(kappa));
+            self.tyres[i] = tyres.at(&at.x, &at.u, path.mu);
             if i as f64 * hold.step < SOON {
                 self.fastest = self.fastest.max(path.wanted);
             }

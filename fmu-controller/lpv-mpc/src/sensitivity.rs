@@ -16,7 +16,7 @@ use crate::guide::Guide;
 use crate::horizon::{Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y, progress};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
 use crate::modes::Estimation;
 use crate::mpc::{Mpc, TyreModel};
 use crate::parameters::HORIZON_MAX;
@@ -114,9 +114,9 @@ pub(crate) fn along<const N_X: usize>(
     for (i, stage) in change.stages.iter_mut().enumerate() {
         let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
         let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
-        let path = guide.advance(|kappa| progress(&scheduled.0, kappa));
+        let path = guide.advance(|kappa| scheduled.progress(kappa));
         let tyres = match &mut neighbours {
-            Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.0, &scheduled.1, path.mu),
+            Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.x, &scheduled.u, path.mu),
             None => fixed(&mpc.tyres[i]),
         };
         let linear = linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around);

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::discretise::Hold;
 use crate::guide::Path;
 use crate::horizon::{Surroundings, linearise};
-use crate::model::{Body, Disturbance, Input, NU, State, Tyres, V_GUARD, V_X};
+use crate::model::{Body, Disturbance, Input, NU, Point, State, Tyres, V_GUARD, V_X};
 use crate::modes::TerminalCost;
 use crate::parameters::Parameters;
 use crate::qp::Problem;
@@ -63,7 +63,7 @@ impl Terminal {
         let around = Surroundings { body, nominal: *tyres, hold };
         let mut x = State::zeros();
         x[V_X] = v_x;
-        let end = linearise::<f64, N_X>(&(x, Input::zeros()), &straight, tyres, &around);
+        let end = linearise::<f64, N_X>(&Point::new(x, Input::zeros()), &straight, tyres, &around);
         // Without a solution the weight of before stays; its speed was not far.
         if let Some(weight) = riccati(&end.A, &end.B, &problem.q, &problem.r) {
             problem.q_terminal = weight * self.factor;

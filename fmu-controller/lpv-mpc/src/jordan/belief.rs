@@ -1,6 +1,7 @@
 //! One stage of a roll along a trajectory: both axle forces as lines through where the stage is.
 
 use super::{Document, Measured, Memory, Network};
+use crate::angles::atans;
 use crate::model::Tyres;
 
 /// Index of the lateral velocity among the inputs.
@@ -9,6 +10,14 @@ const V_Y: usize = 1;
 const YAW_RATE: usize = 2;
 /// Index of the steering angle among the inputs.
 const DELTA: usize = 3;
+
+/// Steering moves the front slip alone, by as much.
+pub(super) const STEERING: [(usize, f64); 1] = [(DELTA, 1.0)];
+
+/// Turning about the front axle, `d v_y = -l_f d yaw_rate`, moves the rear slip alone.
+pub(super) fn turning(document: &Document) -> [(usize, f64); 2] {
+    [(V_Y, -document.l_f), (YAW_RATE, 1.0)]
+}
 
 /// What the network says about one axle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,20 +66,19 @@ impl Belief {
 impl Network {
     /// One sample like [`Network::step`], with the slope of both axle forces and the confidence.
     ///
-    /// The network gives `C` as a function of its inputs; the tangent stiffness is `C + alpha dC/dalpha`. Steering moves the
-    /// front slip alone. Turning about the front axle, `d v_y = -l_f d yaw_rate`, moves the rear slip alone. Along these two
-    /// directions the network is differentiated exactly; the memory is held, being the past.
+    /// The network gives `C` as a function of its inputs; the tangent stiffness is `C + alpha dC/dalpha`. Along the directions
+    /// that move the front slip alone and the rear slip alone the network is differentiated exactly; the memory is held, being
+    /// the past.
     #[must_use]
     pub fn linearise(&self, memory: &Memory, measured: &Measured) -> (Memory, Belief) {
         let Document { l_f, l_r, outputs, .. } = &self.document;
         let (z_f, z_r) = self.drift(measured);
-        let (alpha_f, alpha_r) = (measured.delta - z_f.atan(), -z_r.atan());
-        let steer = [(DELTA, 1.0)];
+        let [drift_f, drift_r] = atans([z_f, z_r]);
+        let (alpha_f, alpha_r) = (measured.delta - drift_f, -drift_r);
         // alpha_r = -atan(z), so d alpha_r = -d z / (1 + z^2), and z falls by (l_f + l_r) / v_x for each unit of yaw rate.
         let turn = measured.v_x * (1.0 + z_r * z_r) / (l_f + l_r);
-        let turn = [(V_Y, -l_f * turn), (YAW_RATE, turn)];
 
-        let ([c_f, c_r], slopes) = self.layers.forward_along(&self.seen(memory, measured), [&steer, &turn]);
+        let ([c_f, c_r], [steered, turned]) = self.layers.forward_along(&self.seen(memory, measured));
         if !(c_f.is_finite() && c_r.is_finite()) {
             return (*memory, self.hold(memory));
         }
@@ -78,8 +86,8 @@ impl Network {
         let (secant_f, secant_r) = self.stiffness(&memory);
         let axle = |alpha: f64, secant: f64, slope: f64| Axle { alpha, secant, tangent: secant + alpha * slope };
         let belief = Belief {
-            front: axle(alpha_f, secant_f, outputs[0].deviation * slopes[0][0]),
-            rear: axle(alpha_r, secant_r, outputs[1].deviation * slopes[1][1]),
+            front: axle(alpha_f, secant_f, outputs[0].deviation * steered),
+            rear: axle(alpha_r, secant_r, outputs[1].deviation * (turn * turned)),
             confidence: self.belief(measured, (alpha_f, alpha_r)),
         };
         (memory, belief)

@@ -28,6 +28,11 @@ impl Range {
         self.max = self.max.max(value);
     }
 
+    #[inline(always)]
+    fn holds(&self, value: f64) -> bool {
+        (value >= self.min) & (value <= self.max)
+    }
+
     /// 1 inside, 0 beyond the margin and for what is not a number, a smooth step in between.
     fn belief(&self, value: f64) -> f64 {
         let outside = (self.min - value).max(value - self.max);
@@ -57,6 +62,11 @@ pub struct Envelope {
 impl Envelope {
     /// 1 where the training was, falling smoothly to 0 over [`MARGIN`] outside; several excesses multiply.
     pub fn belief(&self, inputs: &[f64], (alpha_f, alpha_r): (f64, f64)) -> f64 {
+        // Written without branches: mostly all are inside.
+        let inside = self.inputs.iter().zip(inputs).fold(true, |inside, (range, &value)| inside & range.holds(value));
+        if inside & self.alpha_f.holds(alpha_f) & self.alpha_r.holds(alpha_r) {
+            return 1.0;
+        }
         let slips = self.alpha_f.belief(alpha_f) * self.alpha_r.belief(alpha_r);
         self.inputs.iter().zip(inputs).fold(slips, |belief, (range, &value)| belief * range.belief(value))
     }

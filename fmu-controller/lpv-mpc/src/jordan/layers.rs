@@ -1,141 +1,193 @@
-//! The layers, laid out for the processor, and their forward pass with derivatives along a few directions.
+//! The layers, laid out for the processor, and their forward pass with derivatives along two directions.
 #![allow(clippy::needless_range_loop, reason = "several arrays run along the same index")]
 
 use std::mem;
 
 use super::document::{Layer, Scaling};
-use super::sigmoid::logistic_lanes;
+use super::sigmoid::{TO_EXPONENT, logistic_lanes};
+use super::{FEEDBACK, INPUTS_ACCELERATIONS};
 
 /// Largest width of a layer, inputs included; the paper has 8.
 pub const WIDTH_MAX: usize = 32;
-/// Neurons that are computed side by side: two registers of the oldest 64-bit processors.
-pub const LANES: usize = 4;
-/// Outputs of the last layer, one register.
-const OUTPUTS: usize = 2;
+/// Neurons that are computed side by side: with both derivatives they fill the registers of the oldest 64-bit processors.
+const LANES: usize = 8;
+/// Blocks of the widest layer.
+const BLOCKS: usize = WIDTH_MAX / LANES;
+/// Outputs of the last layer.
+const OUTPUTS: usize = FEEDBACK;
 
-/// The values of one layer.
-pub type Values = [f64; WIDTH_MAX];
+/// What the first layer sees: the measured inputs and the memory, as many as there are.
+pub type Inputs = [f64; INPUTS_ACCELERATIONS + FEEDBACK];
 /// A direction of the input: the elements that are not zero, with their indices.
 pub type Direction = [(usize, f64)];
 
-/// One layer in blocks of `L` neurons; the last block is filled with zeros.
-#[derive(Clone, Debug, PartialEq)]
-struct Packed<const L: usize> {
-    /// Number of inputs.
-    width: usize,
-    /// For each block and each input the weights of the block's neurons.
-    weights: Vec<[f64; L]>,
-    /// For each block the biases of its neurons.
-    biases: Vec<[f64; L]>,
-}
-
-/// The values of one layer and their changes along the directions. They go through a layer together: every weight is loaded
-/// once for all of them.
-#[derive(Clone, Copy)]
-struct Jets<const D: usize> {
-    value: Values,
-    along: [Values; D],
-}
-
-/// The same of one block of neurons.
-#[derive(Clone, Copy)]
-struct Block<const L: usize, const D: usize> {
-    value: [f64; L],
-    along: [[f64; L]; D],
-}
+/// One block of neurons.
+type Block = [f64; LANES];
+/// The values of one layer.
+type Values = [Block; BLOCKS];
 
 /// `y += a x`, side by side.
 #[inline(always)]
-fn axpy<const L: usize>(a: f64, x: &[f64; L], y: &mut [f64; L]) {
-    for lane in 0..L {
+fn axpy(a: f64, x: &Block, y: &mut Block) {
+    for lane in 0..LANES {
         y[lane] += a * x[lane];
     }
 }
 
-impl<const L: usize> Packed<L> {
-    fn new(layer: &Layer) -> Self {
-        let width = layer.weights[0].len();
-        let blocks = layer.biases.len().div_ceil(L);
-        let pick = |row: usize, value: &dyn Fn(usize) -> f64| if row < layer.biases.len() { value(row) } else { 0.0 };
-        let lanes =
-            |block: usize, value: &dyn Fn(usize) -> f64| std::array::from_fn(|lane| pick(block * L + lane, value));
-        Self {
-            width,
-            weights: (0..blocks)
-                .flat_map(|block| (0..width).map(move |i| (block, i)))
-                .map(|(block, i)| lanes(block, &|row| layer.weights[row][i]))
-                .collect(),
-            biases: (0..blocks).map(|block| lanes(block, &|row| layer.biases[row])).collect(),
-        }
-    }
+/// `x y`, side by side.
+#[inline(always)]
+fn times(x: &Block, y: &Block) -> Block {
+    std::array::from_fn(|lane| x[lane] * y[lane])
+}
 
-    /// Weights of each input and biases of a block.
-    #[inline(always)]
-    fn block(&self, block: usize) -> (&[[f64; L]], &[f64; L]) {
-        // No layer is wider; said here, it spares the compiler a check for each input.
-        let width = self.width.min(WIDTH_MAX);
-        (&self.weights[block * width..][..width], &self.biases[block])
+/// The sum over a block, always in the same order.
+#[inline(always)]
+fn sum(x: &Block) -> f64 {
+    let four: [f64; 4] = std::array::from_fn(|lane| x[lane] + x[lane + 4]);
+    (four[0] + four[2]) + (four[1] + four[3])
+}
+
+/// Values in blocks, with zeros behind the last.
+fn in_blocks(values: impl IntoIterator<Item = f64>) -> Vec<Block> {
+    let values: Vec<f64> = values.into_iter().collect();
+    let block = |chunk: &[f64]| std::array::from_fn(|lane| chunk.get(lane).copied().unwrap_or(0.0));
+    values.chunks(LANES).map(block).collect()
+}
+
+/// The first layer, in blocks of neurons.
+#[derive(Clone, Debug, PartialEq)]
+struct First {
+    /// For each block the weights of its neurons, input by input.
+    weights: Vec<Vec<Block>>,
+    /// For each block the biases of its neurons.
+    biases: Vec<Block>,
+    /// For each output the change of the neurons' sums along the output's direction.
+    along: [Vec<Block>; OUTPUTS],
+}
+
+impl First {
+    /// Of a layer whose inputs are quantities in their own units; values and changes take factors.
+    fn new(layer: &Layer, directions: [&Direction; OUTPUTS], (value, change): (f64, f64)) -> Self {
+        let inputs: Vec<_> =
+            (0..layer.weights[0].len()).map(|i| in_blocks(layer.weights.iter().map(|row| value * row[i]))).collect();
+        let along = |row: &[f64], direction: &Direction| direction.iter().map(|(i, x)| row[*i] * x).sum::<f64>();
+        Self {
+            weights: (0..inputs[0].len()).map(|block| inputs.iter().map(|blocks| blocks[block]).collect()).collect(),
+            biases: in_blocks(layer.biases.iter().map(|bias| value * bias)),
+            along: directions.map(|to| in_blocks(layer.weights.iter().map(|row| change * along(row, to)))),
+        }
     }
 
     /// The sums of a block of neurons whose inputs are `x`.
     #[inline(always)]
-    fn sums<const D: usize>(&self, block: usize, x: &Jets<D>) -> Block<L, D> {
-        let (weights, biases) = self.block(block);
-        let mut sums = Block { value: *biases, along: [[0.0; L]; D] };
-        for i in 0..weights.len() {
-            axpy(x.value[i], &weights[i], &mut sums.value);
-            for d in 0..D {
-                axpy(x.along[d][i], &weights[i], &mut sums.along[d]);
+    fn sums(&self, block: usize, x: &Inputs) -> Block {
+        let mut sums = self.biases[block];
+        for (weights, x) in self.weights[block].iter().zip(x) {
+            axpy(*x, weights, &mut sums);
+        }
+        sums
+    }
+}
+
+/// A hidden layer behind the first, in tiles of a block of neurons and a block of inputs: in whole tiles nothing is counted.
+#[derive(Clone, Debug, PartialEq)]
+struct Inner {
+    /// For each block of neurons the tiles of its inputs; in a tile, input by input, the weights of the neurons.
+    tiles: Vec<Vec<[Block; LANES]>>,
+    /// For each block the biases of its neurons.
+    biases: Vec<Block>,
+}
+
+impl Inner {
+    fn new(layer: &Layer, factor: f64) -> Self {
+        let weight =
+            |row: usize, i: usize| layer.weights.get(row).and_then(|row| row.get(i)).map_or(0.0, |w| factor * w);
+        let tile = |block: usize, inputs: usize| {
+            std::array::from_fn(|i| std::array::from_fn(|lane| weight(block * LANES + lane, inputs * LANES + i)))
+        };
+        let inputs = layer.weights[0].len().div_ceil(LANES);
+        let biases = in_blocks(layer.biases.iter().map(|bias| factor * bias));
+        Self { tiles: (0..biases.len()).map(|block| (0..inputs).map(|i| tile(block, i)).collect()).collect(), biases }
+    }
+
+    /// The sums of a block of neurons whose inputs are `x`.
+    #[inline(always)]
+    fn sums(&self, block: usize, x: &Values) -> Block {
+        let mut sums = self.biases[block];
+        for (tile, x) in self.tiles[block].iter().zip(x) {
+            for i in 0..LANES {
+                axpy(x[i], &tile[i], &mut sums);
             }
         }
         sums
     }
 
-    /// The same for the first layer, where the directions are mostly zeros.
+    /// How they change with inputs that change along both directions.
     #[inline(always)]
-    fn first_sums<const D: usize>(&self, block: usize, x: &Values, directions: &[&Direction; D]) -> Block<L, D> {
-        let (weights, biases) = self.block(block);
-        let mut sums = Block { value: *biases, along: [[0.0; L]; D] };
-        for i in 0..weights.len() {
-            axpy(x[i], &weights[i], &mut sums.value);
-        }
-        for d in 0..D {
-            for (i, x) in directions[d] {
-                axpy(*x, &weights[*i], &mut sums.along[d]);
+    fn sums_along(&self, block: usize, [x, y]: &[Values; OUTPUTS]) -> [Block; OUTPUTS] {
+        let mut sums = [[0.0; LANES]; OUTPUTS];
+        for ((tile, x), y) in self.tiles[block].iter().zip(x).zip(y) {
+            for i in 0..LANES {
+                axpy(x[i], &tile[i], &mut sums[0]);
+                axpy(y[i], &tile[i], &mut sums[1]);
             }
         }
         sums
     }
 }
 
-impl<const D: usize> Block<LANES, D> {
-    /// The logistic function of the block, neuron by neuron, as part of a layer.
+/// The last layer: for each output its weights in blocks, and its bias.
+type Last = [(Vec<Block>, f64); OUTPUTS];
+
+#[inline(always)]
+fn dot(weights: &[Block], x: &Values) -> f64 {
+    let mut products = [0.0; LANES];
+    for (weights, x) in weights.iter().zip(x) {
+        for lane in 0..LANES {
+            products[lane] += weights[lane] * x[lane];
+        }
+    }
+    sum(&products)
+}
+
+/// The values of one layer, and their changes along the directions.
+struct Jets {
+    value: Values,
+    along: [Values; OUTPUTS],
+}
+
+impl Jets {
+    const ZERO: Self = Self { value: [[0.0; LANES]; BLOCKS], along: [[[0.0; LANES]; BLOCKS]; OUTPUTS] };
+
+    /// The neurons of a block from their sums.
     #[inline(always)]
-    fn activate(&self, block: usize, out: &mut Jets<D>) {
-        let value = logistic_lanes(self.value);
-        let place = |values: &mut Values, lanes: [f64; LANES]| values.as_chunks_mut().0[block] = lanes;
-        place(&mut out.value, value);
-        for d in 0..D {
-            let mut along = self.along[d];
-            for lane in 0..LANES {
-                along[lane] *= value[lane] * (1.0 - value[lane]);
-            }
-            place(&mut out.along[d], along);
+    fn activate(&mut self, block: usize, sums: Block) {
+        self.value[block] = logistic_lanes(sums);
+    }
+
+    /// The changes of the same neurons from those of their sums.
+    #[inline(always)]
+    fn activate_along(&mut self, block: usize, sums: [&Block; OUTPUTS]) {
+        let value = self.value[block];
+        let slope: Block = std::array::from_fn(|lane| value[lane] * (1.0 - value[lane]));
+        for d in 0..OUTPUTS {
+            self.along[d][block] = times(&slope, sums[d]);
         }
     }
 }
 
-/// The whole stack.
+/// The whole stack. A network without hidden layers has no last layer behind its first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
-    hidden: Vec<Packed<LANES>>,
-    last: Packed<OUTPUTS>,
+    first: First,
+    inner: Vec<Inner>,
+    last: Option<Last>,
 }
 
 impl Layers {
     /// Packs layers whose sizes have been checked. The scaling of the first inputs goes into the weights, so these inputs are
-    /// quantities in their own units.
-    pub fn new(layers: &[Layer], inputs: &[Scaling]) -> Self {
+    /// quantities in their own units. [`Self::forward_along`] differentiates each output along its own one of the `directions`.
+    pub fn new(layers: &[Layer], inputs: &[Scaling], directions: [&Direction; OUTPUTS]) -> Self {
         let mut layers = layers.to_vec();
         let Layer { weights, biases } = &mut layers[0];
         for (row, bias) in weights.iter_mut().zip(biases) {
@@ -144,40 +196,58 @@ impl Layers {
                 *bias -= *w * mean;
             }
         }
-        let (last, hidden) = layers.split_last().expect("a checked document has a layer");
-        Self { hidden: hidden.iter().map(Packed::new).collect(), last: Packed::new(last) }
+        let (first, others) = layers.split_first().expect("a checked document has a layer");
+        let Some((last, inner)) = others.split_last() else {
+            return Self { first: First::new(first, directions, (1.0, 1.0)), inner: Vec::new(), last: None };
+        };
+        // The weights of the inner layers carry the factor of the exponent, which the changes must not.
+        let change = inner.iter().fold(1.0, |change, _| change / TO_EXPONENT);
+        Self {
+            first: First::new(first, directions, (TO_EXPONENT, change)),
+            inner: inner.iter().map(|layer| Inner::new(layer, TO_EXPONENT)).collect(),
+            last: Some(std::array::from_fn(|o| (in_blocks(last.weights[o].iter().copied()), last.biases[o]))),
+        }
     }
 
     /// The two outputs at the input `x`.
     #[inline]
-    pub fn forward(&self, x: &Values) -> [f64; OUTPUTS] {
-        self.forward_along(x, [&[]; 0]).0
+    pub fn forward(&self, x: &Inputs) -> [f64; OUTPUTS] {
+        self.pass::<false>(x).0
     }
 
-    /// The two outputs at the input `x`, and how they change along each direction of the input.
+    /// The two outputs at the input `x`, and how each changes along its direction.
     #[inline]
-    pub fn forward_along<const D: usize>(
-        &self,
-        x: &Values,
-        directions: [&Direction; D],
-    ) -> ([f64; OUTPUTS], [[f64; OUTPUTS]; D]) {
-        let Some((first, inner)) = self.hidden.split_first() else {
-            let Block { value, along } = self.last.first_sums(0, x, &directions);
-            return (value, along);
+    pub fn forward_along(&self, x: &Inputs) -> ([f64; OUTPUTS], [f64; OUTPUTS]) {
+        self.pass::<true>(x)
+    }
+
+    #[inline(always)]
+    fn pass<const ALONG: bool>(&self, x: &Inputs) -> ([f64; OUTPUTS], [f64; OUTPUTS]) {
+        let Self { first, inner, last } = self;
+        let Some(last) = last else {
+            let sums = first.sums(0, x);
+            return (std::array::from_fn(|o| sums[o]), std::array::from_fn(|o| first.along[o][0][o]));
         };
-        let mut jets = [Jets { value: [0.0; WIDTH_MAX], along: [[0.0; WIDTH_MAX]; D] }; 2];
-        let [one, other] = &mut jets;
-        let (mut now, mut next) = (one, other);
-        for block in 0..first.biases.len() {
-            first.first_sums(block, x, &directions).activate(block, now);
+        let (mut one, mut other) = (Jets::ZERO, Jets::ZERO);
+        let (mut now, mut next) = (&mut one, &mut other);
+        // No layer is wider; said here, it spares checks of every block.
+        for block in 0..first.biases.len().min(BLOCKS) {
+            now.activate(block, first.sums(block, x));
+            if ALONG {
+                now.activate_along(block, first.along.each_ref().map(|along| &along[block]));
+            }
         }
         for layer in inner {
-            for block in 0..layer.biases.len() {
-                layer.sums(block, now).activate(block, next);
+            for block in 0..layer.biases.len().min(BLOCKS) {
+                next.activate(block, layer.sums(block, &now.value));
+                if ALONG {
+                    next.activate_along(block, layer.sums_along(block, &now.along).each_ref());
+                }
             }
             mem::swap(&mut now, &mut next);
         }
-        let Block { value, along } = self.last.sums(0, now);
-        (value, along)
+        let output = |o: usize| last[o].1 + dot(&last[o].0, &now.value);
+        let slope = |o: usize| if ALONG { dot(&last[o].0, &now.along[o]) } else { 0.0 };
+        (std::array::from_fn(output), std::array::from_fn(slope))
     }
 }

@@ -24,7 +24,9 @@ pub use layers::WIDTH_MAX;
 pub use sigmoid::sigmoid;
 
 use crate::Error;
-use layers::{Layers, Values};
+use crate::angles::atans;
+use belief::{STEERING, turning};
+use layers::{Inputs, Layers};
 
 /// Measured inputs of the paper's network.
 pub const INPUTS: usize = 5;
@@ -83,7 +85,7 @@ impl TryFrom<Document> for Network {
 
     fn try_from(document: Document) -> Result<Self, Error> {
         document.check()?;
-        let layers = Layers::new(&document.layers, &document.inputs);
+        let layers = Layers::new(&document.layers, &document.inputs, [&STEERING, &turning(&document)]);
         let contraction = contraction(&document.layers);
         Ok(Self { document, layers, contraction })
     }
@@ -164,7 +166,8 @@ impl Network {
     #[must_use]
     pub fn slip_angles(&self, measured: &Measured) -> (f64, f64) {
         let (z_f, z_r) = self.drift(measured);
-        (measured.delta - z_f.atan(), -z_r.atan())
+        let [drift_f, drift_r] = atans([z_f, z_r]);
+        (measured.delta - drift_f, -drift_r)
     }
 
     /// Tangents of the angles at which the front and the rear axle move against the body [1].
@@ -183,13 +186,14 @@ impl Network {
 
     /// What the layers see: the measured inputs, followed by the memory.
     #[inline]
-    fn seen(&self, memory: &Memory, measured: &Measured) -> Values {
-        let n = self.document.inputs.len();
-        let mut x = [0.0; WIDTH_MAX];
-        x[..INPUTS_ACCELERATIONS].copy_from_slice(&measured.values());
-        x[n] = memory.c_f;
-        x[n + 1] = memory.c_r;
-        x
+    fn seen(&self, memory: &Memory, measured: &Measured) -> Inputs {
+        let Measured { v_x, v_y, yaw_rate, delta, a_x, a_y, yaw_acceleration } = *measured;
+        let Memory { c_f, c_r } = *memory;
+        if self.sees_accelerations() {
+            [v_x, v_y, yaw_rate, delta, a_x, a_y, yaw_acceleration, c_f, c_r]
+        } else {
+            [v_x, v_y, yaw_rate, delta, a_x, c_f, c_r, 0.0, 0.0]
+        }
     }
 }
 
