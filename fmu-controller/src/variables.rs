@@ -226,7 +226,7 @@ pub fn table() -> &'static Table<LpvMpcController> {
         Parameter tau_a_x ["s"] "Time constant of the drive and brake actuator; 0: none", min 0.0, max 10.0 => parameters.tau_a_x;
         Parameter estimation "Where the state that the plan starts from comes from", items &ESTIMATION
             => { get |m| m.parameters.estimation as i32, set |m, v: i32| m.parameters.estimation = estimation(v) };
-        Parameter sensor_noise ["1"] "Standard deviations that the filter assumes, in units of 0.03 m/s, 0.002 rad/s, 0.01 m and 0.002 rad", min 1e-3, max 1e3 => parameters.sensor_noise;
+        Parameter sensor_noise ["1"] "Largest standard deviations of the sensors, in units of 0.03 m/s, 0.002 rad/s, 0.01 m and 0.002 rad", min 1e-3, max 1e3 => parameters.sensor_noise;
         Parameter v_y_measured "Whether the lateral velocity is measured; if not, it is estimated" => parameters.v_y_measured;
         Parameter hold_preview "Whether only element 1 of each preview is given and holds for the others" => inputs.hold_preview;
         Parameter network_file "File of the network's weights, a path or file URI, relative to the resources; empty: the built-in network" => network_file;

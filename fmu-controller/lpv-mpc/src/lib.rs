@@ -36,6 +36,7 @@ pub mod latency;
 pub mod model;
 mod modes;
 pub mod mpc;
+mod noise;
 pub mod parameters;
 mod plan;
 pub mod preview;

@@ -92,8 +92,8 @@ pub struct Parameters {
     pub tau_a_x: f64,
     /// Where the state that the plan starts from comes from.
     pub estimation: Estimation,
-    /// Standard deviations of the sensors that the filter assumes, in units of 0.03 m/s on both velocities, 0.002 rad/s,
-    /// 0.01 m and 0.002 rad [1].
+    /// Largest standard deviations of the sensors, in units of 0.03 m/s on both velocities, 0.002 rad/s, 0.01 m and 0.002 rad
+    /// [1]. That they have less, down to a tenth, is found out.
     pub sensor_noise: f64,
     /// Whether the lateral velocity is measured; if not, it is estimated.
     pub v_y_measured: bool,
