@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-9;
 const NO_LIMIT: f64 = 1e3;
 
 /// One quantity at the places of the preview.
-type Row<T> = [T; PREVIEW];
+pub type Row<T> = [T; PREVIEW];
 
 /// The previewed road, laid out over distance.
 #[derive(Clone, Copy, Debug)]
@@ -52,18 +52,15 @@ pub struct Place<T> {
 }
 
 impl<T: Scalar> Road<T> {
-    /// Lays a preview out: element `i` has curvature [1/m], wanted speed [m/s] and friction, 0 where that is unknown [1].
-    pub fn new(element: impl Fn(usize) -> [T; 3], p: &Parameters) -> Self {
-        let rows: [[T; 3]; PREVIEW] = std::array::from_fn(element);
-        let row = |k: usize| std::array::from_fn(|i| rows[i][k]);
-        let (kappa, v_x): (Row<T>, Row<T>) = (row(0), row(1));
+    /// Lays a preview out: curvature [1/m], wanted speed [m/s] and friction, 0 where that is unknown [1].
+    #[inline(always)]
+    pub fn new([kappa, v_x, mu]: [Row<T>; 3], p: &Parameters) -> Self {
         let mut s = [T::zero(); PREVIEW];
         for i in 1..PREVIEW {
             s[i] = s[i - 1] + ((v_x[i - 1] + v_x[i]) * 0.5).larger(PACE_MIN) * p.t_s;
         }
-        let mu = std::array::from_fn(|i| {
-            if rows[i][2].re() > 0.0 { rows[i][2].larger(FRICTION_MIN) } else { T::from(p.mu.max(FRICTION_MIN)) }
-        });
+        let unknown = T::from(p.mu.max(FRICTION_MIN));
+        let mu = mu.map(|mu| if mu.re() > 0.0 { mu.larger(FRICTION_MIN) } else { unknown });
         let limit = permitted(&s, &kappa, &v_x, &mu, p);
         Self { s, kappa, v_x, mu, limit, period: p.t_s }
     }
@@ -122,10 +119,11 @@ impl<T: Scalar> Place<T> {
 /// place could be driven at the fastest wanted speed, nothing is limited, and nothing is passed.
 fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, v_x: &Row<T>, mu: &Row<T>, p: &Parameters) -> Row<T> {
     let mut limit = [T::from(NO_LIMIT); PREVIEW];
-    let fastest = v_x.iter().fold(0.0, |fastest: f64, v_x| fastest.max(v_x.re()));
+    // A comparison is one instruction, unlike `max`, and these chains are long.
+    let fastest = v_x.iter().fold(0.0, |fastest: f64, v_x| if v_x.re() > fastest { v_x.re() } else { fastest });
     let grip = |i: usize| mu[i] * (p.grip_max * p.g);
     let is_easy = |i: usize| kappa[i].re().abs() * fastest * fastest <= grip(i).re();
-    if p.grip_max == 0.0 || (0..PREVIEW).all(is_easy) {
+    if p.grip_max == 0.0 || (0..PREVIEW).fold(true, |easy, i| easy & is_easy(i)) {
         return limit;
     }
     for i in (0..PREVIEW).rev() {
@@ -154,6 +152,11 @@ fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, v_x: &Row<T>, mu: &Row<T>, p
 mod tests {
     use super::*;
 
+    /// A preview by its elements.
+    fn rows(element: impl Fn(usize) -> [f64; 3]) -> [Row<f64>; 3] {
+        std::array::from_fn(|k| std::array::from_fn(|i| element(i)[k]))
+    }
+
     /// Straight, then a curve of 1/50 m from element 20 on, at a constant 20 m/s.
     fn curve(i: usize) -> [f64; 3] {
         [if i < 20 { 0.0 } else { 0.02 }, 20.0, 0.0]
@@ -162,7 +165,7 @@ mod tests {
     #[test]
     fn places_are_where_the_reference_is() {
         let p = Parameters::default();
-        let road = Road::new(|i| [1e-4 * i as f64, 10.0 + 0.1 * i as f64, 0.0], &p);
+        let road = Road::new(rows(|i| [1e-4 * i as f64, 10.0 + 0.1 * i as f64, 0.0]), &p);
         // Trapezoidal sum of a linear speed, in closed form: t (10 + 0.05 t / t_s) at t = 7 periods.
         let distance = p.t_s * (70.0 + 0.05 * 49.0);
         assert!((road.curvature(distance) - 7e-4).abs() < 1e-15);
@@ -175,7 +178,7 @@ mod tests {
     #[test]
     fn speed_before_a_curve_is_what_full_braking_leaves() {
         let p = Parameters { a_x_min: -100.0, ..Parameters::default() };
-        let road = Road::new(curve, &p);
+        let road = Road::new(rows(curve), &p);
         let grip = p.grip_max * p.mu * p.g;
         let in_curve = (grip / 0.02).sqrt();
         let step = 20.0 * p.t_s;
@@ -184,16 +187,16 @@ mod tests {
         let (_, _, limit) = road.at(&road.find(9.0 * step, 0));
         let expected = (in_curve * in_curve + 2.0 * grip * 10.0 * step).sqrt();
         assert!((limit - expected).abs() < 1e-9, "{limit} for {expected}");
-        let weak = Road::new(curve, &Parameters { a_x_min: -2.0, ..p.clone() });
+        let weak = Road::new(rows(curve), &Parameters { a_x_min: -2.0, ..p.clone() });
         assert!(weak.at(&weak.find(9.0 * step, 0)).2 < limit, "weak brakes need more room");
-        let off = Road::new(curve, &Parameters { grip_max: 0.0, ..p });
+        let off = Road::new(rows(curve), &Parameters { grip_max: 0.0, ..p });
         assert_eq!(off.at(&off.find(30.0 * step, 0)).2, NO_LIMIT);
     }
 
     #[test]
     fn friction_of_the_preview_counts_and_the_parameter_where_there_is_none() {
         let p = Parameters::default();
-        let road = Road::new(|i| [0.02, 20.0, if i < 20 { 0.0 } else { 0.4 }], &p);
+        let road = Road::new(rows(|i| [0.02, 20.0, if i < 20 { 0.0 } else { 0.4 }]), &p);
         let step = 20.0 * p.t_s;
         assert_eq!(road.friction(5.0 * step), p.mu);
         assert_eq!(road.friction(30.0 * step), 0.4);

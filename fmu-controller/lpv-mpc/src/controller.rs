@@ -1,5 +1,7 @@
 //! The controller as its importer sees it: measurements in, commands out, one communication step at a time.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use crate::adaptation::Adapter;
@@ -13,7 +15,6 @@ use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
 use crate::modes::{Adaptation, Estimation};
 use crate::mpc::Mpc;
-use crate::parameters::HORIZON_MAX;
 use crate::qp::Problem;
 use crate::recovery::Recovery;
 use crate::sensitivity::{self, Snapshot};
@@ -45,6 +46,8 @@ macro_rules! with_mpc {
 struct Beliefs {
     body: Body,
     tyres: Adapter,
+    /// Period and lags of the prediction model.
+    hold: Hold,
 }
 
 /// Adaptive LPV-MPC of steering and speed.
@@ -96,7 +99,7 @@ impl Controller {
         let tau = [p.tau_delta, p.tau_a_x];
         let tyres = p.nominal_tyres();
         Ok(Self {
-            beliefs: Beliefs { body: p.body(), tyres: Adapter::new(p, network) },
+            beliefs: Beliefs { body: p.body(), tyres: Adapter::new(p, network), hold: Hold::new(p.t_s, tau) },
             estimator: Estimator::new(p.sensor_noise),
             blind: 0,
             core: if tau == [0.0, 0.0] {
@@ -159,7 +162,7 @@ impl Controller {
     /// # Errors
     /// [`Error::Step`] for a step that is not positive and finite; the controller is as before then.
     pub fn advance(&mut self, t: f64, h: f64, inputs: &Inputs) -> Result<(), Error> {
-        self.advance_with(t, h, |_| (0.0, inputs.clone()))
+        self.advance_with(t, h, |_| (0.0, Cow::Borrowed(inputs)))
     }
 
     /// Like [`advance`](Self::advance), with inputs that change at `rates` (each per second) within the step: a sample inside
@@ -168,12 +171,17 @@ impl Controller {
     /// # Errors
     /// See [`advance`](Self::advance).
     pub fn advance_along(&mut self, t: f64, h: f64, inputs: &Inputs, rates: &Inputs) -> Result<(), Error> {
-        self.advance_with(t, h, |age| (age, inputs.moved(rates, age)))
+        self.advance_with(t, h, |age| (age, Cow::Owned(inputs.moved(rates, age))))
     }
 
     /// Takes the samples of a step; `measure` says, for a time since the start of the step [s], how long after the start the
     /// measurement that the sample uses is taken [s], and what it is.
-    fn advance_with(&mut self, t: f64, h: f64, measure: impl Fn(f64) -> (f64, Inputs)) -> Result<(), Error> {
+    fn advance_with<'a>(
+        &mut self,
+        t: f64,
+        h: f64,
+        measure: impl Fn(f64) -> (f64, Cow<'a, Inputs>),
+    ) -> Result<(), Error> {
         if !(h > 0.0 && h.is_finite() && t.is_finite()) {
             return Err(Error::Step(h));
         }
@@ -201,19 +209,18 @@ impl Controller {
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
         (self.snapshot.tyres[0], self.snapshot.memory) = (*self.beliefs.tyres.present(), self.beliefs.tyres.memory());
         let (x, trend, complete) = self.estimate(inputs, duration, &delivered);
-        let Self { parameters: p, beliefs: Beliefs { body, tyres }, core, latency, .. } = self;
-        let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
+        let Self { parameters: p, beliefs: Beliefs { body, tyres, hold }, core, latency, .. } = self;
         let road = inputs.road(p);
         tyres.observe(&x, &delivered, road.friction(0.0));
         self.snapshot.tyres[1] = *tyres.present();
         let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &trend);
         let u_prev = self.u_prev;
-        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, &hold), &trend);
+        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, hold), &trend);
         let recovery = Recovery::new(&at, road.friction(at.distance), p);
         let guide = recovery.iter().fold(guide, |guide, recovery| guide.no_faster_than(recovery.pace));
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());
         let (status, command) = with_mpc!(core, mpc => {
-            let outcome = mpc.step(&at, &u_prev, (&guide, recovery.as_ref()), &hold, body, tyres);
+            let outcome = mpc.step(&at, &u_prev, (&guide, recovery.as_ref()), hold, body, tyres);
             // Without an answer the plan has only moved on; its next command is as good as it was foreseen.
             if mpc.plan.is_left() && sighted {
                 (Status::of(outcome, complete), mpc.plan.u[0])
@@ -242,8 +249,8 @@ impl Controller {
         if self.sampled > 1 {
             return Err(Error::NoDerivative("several samples were taken in one step"));
         }
-        let Self { parameters, beliefs: Beliefs { body, tyres }, latency, snapshot, .. } = self;
-        let given = (parameters, body, tyres, latency);
+        let Self { parameters, beliefs: Beliefs { body, tyres, hold }, latency, snapshot, .. } = self;
+        let given = (parameters, body, tyres, hold, latency);
         with_mpc!(&self.core, mpc => sensitivity::along(mpc, snapshot, direction, given)).ok_or(Error::NoDerivative(
             "the plan is the first one, leads back from far off the path, or is not an exact optimum",
         ))
@@ -261,7 +268,7 @@ impl Controller {
         if !self.parameters.v_y_measured {
             measured[V_Y] = f64::NAN;
         }
-        let Beliefs { body, tyres } = &self.beliefs;
+        let Beliefs { body, tyres, .. } = &self.beliefs;
         if self.estimator.update(&measured, inputs.kappa_ref[0], delivered, duration, body, tyres.present()) {
             // Some importers show zeros until the first exchange of values: a plan for a car at rest serves no moving one.
             with_mpc!(&mut self.core, mpc => mpc.forget());
@@ -284,10 +291,10 @@ impl Controller {
                 // What stands there may not even be finite; the trajectories shown stay those of the last plan.
                 return;
             }
-            let last = mpc.plan.u.len() - 1;
-            for i in 0..HORIZON_MAX {
-                output.set_stage(i, &vehicle_part(&mpc.plan.x[i.min(last) + 1]), &mpc.plan.u[i.min(last)]);
+            for (i, (x, u)) in mpc.plan.x[1..].iter().zip(&mpc.plan.u).enumerate() {
+                output.set_stage(i, &vehicle_part(x), u);
             }
+            output.hold_from(mpc.plan.u.len() - 1);
         });
     }
 }

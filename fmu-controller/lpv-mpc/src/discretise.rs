@@ -6,6 +6,7 @@
 //! lags alike.
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Lpv, NU, NX, State, V_X, V_Y, YAW_RATE};
@@ -21,7 +22,7 @@ const PIECES_MAX: u32 = 64;
 const ORDER: usize = 4;
 
 /// What depends on the step and the lags alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     /// Step [s].
     pub step: f64,
@@ -29,14 +30,22 @@ pub struct Hold {
     tau: [f64; NU],
     /// What is left of a lag's distance to its command after the step [1].
     pub decay: [f64; NU],
-    /// Moments of the decaying distance.
-    moments: [[f64; ORDER]; NU],
+    /// Moments of what is held over the whole step.
+    held: [f64; ORDER],
+    /// Moments of the actuators' decaying distances to their commands.
+    distant: [[f64; ORDER]; NU],
+    /// What these leave of the held ones.
+    reached: [[f64; ORDER]; NU],
 }
 
 impl Hold {
     /// A hold over `step` [s] behind lags with time constants `tau` [s]; 0 is no lag.
     pub fn new(step: f64, tau: [f64; NU]) -> Self {
-        Self { step, tau, decay: tau.map(|tau| decay(step, tau)), moments: tau.map(|tau| moments(step, tau)) }
+        let h = step;
+        let held = [h, h * h / 2.0, h * h * h / 6.0, h * h * h * h / 24.0];
+        let distant = tau.map(|tau| moments(step, tau));
+        let reached = distant.map(|distant| std::array::from_fn(|k| held[k] - distant[k]));
+        Self { step, tau, decay: tau.map(|tau| decay(step, tau)), held, distant, reached }
     }
 }
 
@@ -75,17 +84,22 @@ fn moments(step: f64, tau: f64) -> [f64; ORDER] {
     moments
 }
 
-/// One sample: `x+ = Phi x + Gamma u + Lag (a - u) + d`, where `a` is what the actuators deliver at the start.
+/// One sample: `x+ = Phi x + Gamma u + d`. With `N_X` of 7 the last states are what the actuators deliver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Discrete<T = f64> {
+pub struct Discrete<T = f64, const N_X: usize = NX> {
     /// State transition.
-    pub Phi: SMatrix<T, NX, NX>,
-    /// Response to commands held over the sample, as if there were no lags.
-    pub Gamma: SMatrix<T, NX, NU>,
-    /// Response to the decaying distance between actuator and command.
-    pub Lag: SMatrix<T, NX, NU>,
+    pub Phi: SMatrix<T, N_X, N_X>,
+    /// Response to commands held over the sample.
+    pub Gamma: SMatrix<T, N_X, NU>,
     /// Response to the affine term.
-    pub d: State<T>,
+    pub d: SVector<T, N_X>,
+}
+
+impl<T: Scalar, const N_X: usize> Discrete<T, N_X> {
+    /// To be filled.
+    pub fn zeros() -> Self {
+        Self { Phi: SMatrix::zeros(), Gamma: SMatrix::zeros(), d: SVector::zeros() }
+    }
 }
 
 /// Two columns of a matrix side by side, those of `v_y` and `yaw_rate`: a row for each state.
@@ -166,74 +180,106 @@ impl<T: Scalar> Columns<T> {
     }
 }
 
-/// Discretises the system over a hold.
-#[inline(always)]
+/// Discretises the system over a hold, the actuators being ideal.
+#[inline]
 pub fn discretise<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
+    let mut sample = Discrete::zeros();
+    let Discrete { Phi, Gamma, d } = &mut sample;
+    discretise_into(lpv, hold, Phi, Gamma, d);
+    sample
+}
+
+/// Discretises the system over a hold, behind the lags if there is room for what the actuators deliver.
+#[inline(always)]
+pub fn discretise_into<T: Scalar, const N_X: usize>(
+    lpv: &Lpv<T>,
+    hold: &Hold,
+    Phi: &mut SMatrix<T, N_X, N_X>,
+    Gamma: &mut SMatrix<T, N_X, NU>,
+    d: &mut SVector<T, N_X>,
+) {
     let rate = lpv.A[(V_Y, V_Y)].re().abs().max(lpv.A[(YAW_RATE, YAW_RATE)].re().abs());
     let stiffness = hold.step * rate;
-    if stiffness <= STIFFNESS_MAX {
-        return one_piece(lpv, hold);
+    if stiffness > STIFFNESS_MAX {
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to a small count before the cast")]
+        let pieces = (stiffness / STIFFNESS_MAX).ceil().min(f64::from(PIECES_MAX)) as u32;
+        let whole = compose(lpv, hold, pieces);
+        (*Phi, *Gamma, *d) = (whole.Phi, whole.Gamma, whole.d);
+    } else {
+        one_piece(lpv, hold, Phi, Gamma, d);
     }
-    #[expect(clippy::cast_possible_truncation, reason = "clamped to a small count before the cast")]
-    let pieces = (stiffness / STIFFNESS_MAX).ceil().min(f64::from(PIECES_MAX)) as u32;
-    compose(lpv, hold, pieces)
 }
 
 /// The series over the whole hold.
 #[inline(always)]
-fn one_piece<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
-    let Lpv { A, B, d } = lpv;
-    let h = hold.step;
+fn one_piece<T: Scalar, const N_X: usize>(
+    lpv: &Lpv<T>,
+    hold: &Hold,
+    Phi: &mut SMatrix<T, N_X, N_X>,
+    Gamma: &mut SMatrix<T, N_X, NU>,
+    d: &mut SVector<T, N_X>,
+) {
+    let Lpv { A, B, d: affine } = lpv;
     let first = Columns::of(A);
     let second = first.multiplied(A);
     let third = second.multiplied(A);
     let powers = [first, second, third];
     // Columns of the integral of the exponential: everything the inputs and the affine term excite lies in their span.
-    let Psi = Columns::series(&powers, &[h, h * h / 2.0, h * h * h / 6.0, h * h * h * h / 24.0]);
+    let Psi = Columns::series(&powers, &hold.held);
 
+    Phi.fill(T::zero());
     let moved = Psi.multiplied(A).plus_identity();
-    let mut Phi = SMatrix::<T, NX, NX>::identity();
     for i in 0..NX {
         Phi[(i, V_X)] = moved.v_x[i];
         Phi[(i, V_Y)] = moved.lateral[i][0];
         Phi[(i, YAW_RATE)] = moved.lateral[i][1];
     }
     // The columns of e_y and e_psi are exact after one term.
-    Phi[(E_Y, E_PSI)] = A[(E_Y, E_PSI)] * h;
+    Phi[(E_Y, E_Y)] = T::one();
+    Phi[(E_Y, E_PSI)] = A[(E_Y, E_PSI)] * hold.step;
+    Phi[(E_PSI, E_PSI)] = T::one();
 
-    let b_delta = [B[(V_X, DELTA)], B[(V_Y, DELTA)], B[(YAW_RATE, DELTA)]];
-    let mut Lag = SMatrix::<T, NX, NU>::zeros();
-    if hold.tau[DELTA] > 0.0 {
-        Lag.set_column(DELTA, &Columns::series(&powers, &hold.moments[DELTA]).combine(b_delta));
+    let b = [B[(V_X, DELTA)], B[(V_Y, DELTA)], B[(YAW_RATE, DELTA)]];
+    *d = extended(&Psi.combine([affine[V_X], affine[V_Y], affine[YAW_RATE]]));
+    if N_X == NX {
+        Gamma.set_column(DELTA, &extended(&Psi.combine(b)));
+        Gamma.set_column(A_X, &extended(&Psi.v_x));
+        return;
     }
-    if hold.tau[A_X] > 0.0 {
-        Lag.set_column(A_X, &Columns::series(&powers, &hold.moments[A_X]).v_x);
+    let steering = [extended(&b.into()), powers[0].combine(b), powers[1].combine(b), powers[2].combine(b)];
+    let drive = [State::ith(V_X, T::one()), powers[0].v_x, powers[1].v_x, powers[2].v_x];
+    for (j, excited) in [(DELTA, steering), (A_X, drive)] {
+        let respond = |weights: &[f64; ORDER]| {
+            let [a, b, c, d] = &excited;
+            let w = weights.map(T::from);
+            a * w[0] + b * w[1] + c * w[2] + d * w[3]
+        };
+        Phi.set_column(NX + j, &extended(&respond(&hold.distant[j])));
+        Gamma.set_column(j, &extended(&respond(&hold.reached[j])));
+        Phi[(NX + j, NX + j)] = T::from(hold.decay[j]);
+        Gamma[(NX + j, j)] = T::from(1.0 - hold.decay[j]);
     }
-    Discrete {
-        Phi,
-        Gamma: SMatrix::from_columns(&[Psi.combine(b_delta), Psi.v_x]),
-        Lag,
-        d: Psi.combine([d[V_X], d[V_Y], d[YAW_RATE]]),
-    }
+}
+
+/// A vector with zeros behind its end.
+#[inline(always)]
+fn extended<T: Scalar, const N: usize, const N_X: usize>(x: &SVector<T, N>) -> SVector<T, N_X> {
+    SVector::from_fn(|i, _| if i < N { x[i] } else { T::zero() })
 }
 
 /// The hold cut into equal pieces and put together again, for modes too fast for the series.
 #[cold]
-fn compose<T: Scalar>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) -> Discrete<T> {
-    let short = Hold::new(hold.step / f64::from(pieces), hold.tau);
-    let piece = one_piece(lpv, &short);
-    let decay = SMatrix::<T, NU, NU>::from_diagonal(&SVector::from(short.decay.map(T::from)));
-    let mut left = SMatrix::<T, NU, NU>::identity();
-    let mut whole =
-        Discrete { Phi: SMatrix::identity(), Gamma: SMatrix::zeros(), Lag: SMatrix::zeros(), d: State::zeros() };
+fn compose<T: Scalar, const N_X: usize>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) -> Discrete<T, N_X> {
+    let mut piece = Discrete::zeros();
+    let Discrete { Phi, Gamma, d } = &mut piece;
+    one_piece(lpv, &Hold::new(hold.step / f64::from(pieces), hold.tau), Phi, Gamma, d);
+    let mut whole = Discrete { Phi: SMatrix::identity(), ..Discrete::zeros() };
     for _ in 0..pieces {
         whole = Discrete {
             Phi: piece.Phi * whole.Phi,
             Gamma: piece.Phi * whole.Gamma + piece.Gamma,
-            Lag: piece.Phi * whole.Lag + piece.Lag * left,
             d: piece.Phi * whole.d + piece.d,
         };
-        left *= decay;
     }
     whole
 }
@@ -268,12 +314,24 @@ mod tests {
         x
     }
 
+    fn with_actuators(lpv: &Lpv, hold: &Hold) -> Discrete<f64, 7> {
+        let mut sample = Discrete::zeros();
+        let Discrete { Phi, Gamma, d } = &mut sample;
+        discretise_into(lpv, hold, Phi, Gamma, d);
+        sample
+    }
+
     fn error_of_one_sample(v_x: f64, step: f64, tau: [f64; NU]) -> f64 {
         let lpv = system(v_x);
         let (x, a, u) = (State::from([v_x, 0.3, 0.2, 0.4, 0.1]), Input::from([0.02, -0.5]), Input::from([0.05, 1.0]));
-        let Discrete { Phi, Gamma, Lag, d } = discretise(&lpv, &Hold::new(step, tau));
-        let sampled = Phi * x + Gamma * u + Lag * (a - u) + d;
-        (sampled - integrate(&lpv, x, a, u, step, tau)).norm()
+        let Discrete { Phi, Gamma, d } = with_actuators(&lpv, &Hold::new(step, tau));
+        let from = SVector::<f64, 7>::from([x[0], x[1], x[2], x[3], x[4], a[0], a[1]]);
+        let sampled = Phi * from + Gamma * u + d;
+        for j in 0..NU {
+            let delivered = u[j] + (a[j] - u[j]) * decay(step, tau[j]);
+            assert!((sampled[NX + j] - delivered).abs() < 1e-14, "actuator {j}: {}", sampled[NX + j]);
+        }
+        (sampled.fixed_rows::<NX>(0) - integrate(&lpv, x, a, u, step, tau)).norm()
     }
 
     #[test]
@@ -307,10 +365,14 @@ mod tests {
     #[test]
     fn a_very_fast_lag_is_no_lag() {
         let lpv = system(15.0);
-        let lag = discretise(&lpv, &Hold::new(0.033, [1e-9, 1e-9]));
-        assert!(lag.Lag.norm() < 1e-6, "{}", lag.Lag);
+        let ideal = discretise(&lpv, &Hold::new(0.033, [0.0, 0.0])).Gamma;
+        let delivered = |sample: &Discrete<f64, 7>| sample.Phi.fixed_view::<NX, NU>(0, NX).into_owned();
+        let lag = with_actuators(&lpv, &Hold::new(0.033, [1e-9, 1e-9]));
+        assert!(delivered(&lag).norm() < 1e-6, "{}", lag.Phi);
+        assert!((lag.Gamma.fixed_rows::<NX>(0) - ideal).norm() < 1e-6, "{}", lag.Gamma);
         // A lag that never moves: the actuator's value acts instead of the command.
-        let frozen = discretise(&lpv, &Hold::new(0.033, [1e9, 1e9]));
-        assert!((frozen.Lag - frozen.Gamma).norm() < 1e-9, "{}", frozen.Lag - frozen.Gamma);
+        let frozen = with_actuators(&lpv, &Hold::new(0.033, [1e9, 1e9]));
+        assert!((delivered(&frozen) - ideal).norm() < 1e-9, "{}", frozen.Phi);
+        assert!(frozen.Gamma.norm() < 1e-9, "{}", frozen.Gamma);
     }
 }

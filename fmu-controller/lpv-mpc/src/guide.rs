@@ -156,10 +156,11 @@ impl<'a, T: Scalar> Guide<'a, T> {
 mod tests {
     use super::*;
     use crate::model::State;
+    use crate::preview::PREVIEW;
 
     /// Speeds that the guide gives over `stages` to a car at 20 m/s that wants `wanted` [m/s].
     fn speeds(p: &Parameters, wanted: f64, stages: usize) -> Vec<f64> {
-        let road = Road::new(|_| [0.0, wanted, 0.0], p);
+        let road = Road::new([[0.0; PREVIEW], [wanted; PREVIEW], [0.0; PREVIEW]], p);
         let at = Predicted { x: State::from([20.0, 0.0, 0.0, 0.0, 0.0]), distance: 0.0, actual: Input::zeros() };
         let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
         let given = (p, &p.body(), &hold);

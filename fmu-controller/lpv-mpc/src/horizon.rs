@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::Scalar;
-use crate::discretise::{Discrete, Hold, discretise};
+use crate::discretise::{Hold, discretise_into};
 use crate::guide::Path;
 use crate::latency::Predicted;
 use crate::model::{
@@ -25,20 +25,21 @@ pub struct Surroundings<'a> {
     pub hold: &'a Hold,
 }
 
-/// One stage of the quadratic programme, `x+ = A x + B u + d` with the reference of `x+`.
-pub struct Linear<T, const N_X: usize> {
+/// One stage of the quadratic programme to be filled, `x+ = A x + B u + d` with the reference of `x+`.
+pub struct Linear<'a, T, const N_X: usize> {
     /// System matrix.
-    pub A: SMatrix<T, N_X, N_X>,
+    pub A: &'a mut SMatrix<T, N_X, N_X>,
     /// Input matrix.
-    pub B: SMatrix<T, N_X, NU>,
+    pub B: &'a mut SMatrix<T, N_X, NU>,
     /// Affine term.
-    pub d: SVector<T, N_X>,
+    pub d: &'a mut SVector<T, N_X>,
     /// Reference.
-    pub x_ref: SVector<T, N_X>,
+    pub x_ref: &'a mut SVector<T, N_X>,
 }
 
-impl<const N_X: usize> From<Linear<f64, N_X>> for Stage<N_X, NU> {
-    fn from(Linear { A, B, d, x_ref }: Linear<f64, N_X>) -> Self {
+impl<'a, const N_X: usize> From<&'a mut Stage<N_X, NU>> for Linear<'a, f64, N_X> {
+    #[inline(always)]
+    fn from(Stage { A, B, d, x_ref }: &'a mut Stage<N_X, NU>) -> Self {
         Self { A, B, d, x_ref }
     }
 }
@@ -57,45 +58,19 @@ pub fn middle<T: Scalar, const N_X: usize>(
     Point::new(vehicle_part(&middle), acting)
 }
 
-/// The stage at a scheduling point.
+/// Fills the stage at a scheduling point.
 #[inline(always)]
 pub fn linearise<T: Scalar, const N_X: usize>(
     at: &Point<T>,
     path: &Path<T>,
     tyres: &Tyres<T>,
     around: &Surroundings<'_>,
-) -> Linear<T, N_X> {
+    Linear { A, B, d, x_ref }: Linear<'_, T, N_X>,
+) {
     let Surroundings { body, nominal, hold } = around;
     let kappa = (path.kappa[0] + path.kappa[1]) * 0.5;
-    let sample = discretise(&embed_at(at, kappa, body, tyres, &path.disturbance), hold);
-    let (A, B) = behind_lags(&sample, hold);
-    let mut d = SVector::<T, N_X>::zeros();
-    d.fixed_rows_mut::<NX>(0).copy_from(&sample.d);
-    Linear { A, B, d, x_ref: steady_state(path.v_x, path.kappa[1], body, nominal) }
-}
-
-/// System and input matrix, with the actuators as states when there is room for them.
-#[inline(always)]
-fn behind_lags<T: Scalar, const N_X: usize>(
-    sample: &Discrete<T>,
-    hold: &Hold,
-) -> (SMatrix<T, N_X, N_X>, SMatrix<T, N_X, NU>) {
-    let Discrete { Phi, Gamma, Lag, .. } = sample;
-    let (mut A, mut B) = (SMatrix::<T, N_X, N_X>::zeros(), SMatrix::<T, N_X, NU>::zeros());
-    A.fixed_view_mut::<NX, NX>(0, 0).copy_from(Phi);
-    if N_X == NX {
-        B.fixed_rows_mut::<NX>(0).copy_from(Gamma);
-        return (A, B);
-    }
-    B.fixed_rows_mut::<NX>(0).copy_from(&(Gamma - Lag));
-    for j in 0..NU {
-        for i in 0..NX {
-            A[(i, NX + j)] = Lag[(i, j)];
-        }
-        A[(NX + j, NX + j)] = T::from(hold.decay[j]);
-        B[(NX + j, j)] = T::from(1.0 - hold.decay[j]);
-    }
-    (A, B)
+    discretise_into(&embed_at(at, kappa, body, tyres, &path.disturbance), hold, A, B, d);
+    *x_ref = steady_state(path.v_x, path.kappa[1], body, nominal);
 }
 
 /// Reference of the states: steady cornering at the wanted speed without lateral error.

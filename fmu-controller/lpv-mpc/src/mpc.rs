@@ -222,7 +222,7 @@ impl<const N_X: usize> Mpc<N_X> {
             if i as f64 * hold.step < SOON {
                 self.fastest = self.fastest.max(path.wanted);
             }
-            *stage = linearise(&at, &path, &self.tyres[i], &around).into();
+            linearise(&at, &path, &self.tyres[i], &around, stage.into());
             if let Some(recovery) = recovery {
                 let (e_y, e_psi) = recovery.at(i, path.v_x);
                 stage.x_ref[E_Y] += e_y;

@@ -55,7 +55,8 @@ impl<const N_X: usize> Plan<N_X> {
     /// Becomes `plan`, and less of it the more its steering differs from what stands here.
     pub fn take(&mut self, plan: &Self) {
         let steering = plan.u.iter().zip(&self.u).map(|(planned, scheduled)| (planned - scheduled)[DELTA].abs());
-        let share = if self.is_left() { (1.0 + steering.fold(0.0, f64::max) / DAMPED).recip() } else { 1.0 };
+        let largest = steering.fold(0.0, |largest, change| if change > largest { change } else { largest });
+        let share = if self.is_left() { (1.0 + largest / DAMPED).recip() } else { 1.0 };
         // Written so that all of the plan is the plan, to the last bit and whatever was scheduled before.
         let mix = |before: f64, planned: f64| if share < 1.0 { before + share * (planned - before) } else { planned };
         for (scheduled, planned) in self.x.iter_mut().zip(&plan.x) {

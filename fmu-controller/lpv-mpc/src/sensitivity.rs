@@ -6,6 +6,7 @@
 //! the side on which the solver ended is returned. Tyres that the network gives are followed by central differences of the
 //! network, whose tangents are derivatives already ([`crate::adaptation`]).
 
+use nalgebra::{SMatrix, SVector};
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
@@ -13,13 +14,12 @@ use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
 use crate::guide::Guide;
-use crate::horizon::{Surroundings, full_state, linearise, middle, vehicle_part};
+use crate::horizon::{Linear, Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
 use crate::modes::Estimation;
 use crate::mpc::{Mpc, TyreModel};
-use crate::parameters::HORIZON_MAX;
 use crate::qp::{Perturbation, Stage};
 use crate::trend::Trend;
 use crate::{Inputs, Output, Parameters};
@@ -89,12 +89,11 @@ pub(crate) fn along<const N_X: usize>(
     mpc: &Mpc<N_X>,
     snapshot: &Snapshot,
     direction: &Inputs,
-    (p, body, adapter, latency): (&Parameters, &Body, &Adapter, &Latency),
+    (p, body, adapter, hold, latency): (&Parameters, &Body, &Adapter, &Hold, &Latency),
 ) -> Option<Output> {
     if !mpc.smooth {
         return None;
     }
-    let hold = Hold::new(p.t_s, [p.tau_delta, p.tau_a_x]);
     let (x, trend) = snapshot.estimate(direction, p, body);
     let road = snapshot.inputs.road_along(direction, p);
     let mu = road.friction(Dual64::from(0.0));
@@ -105,8 +104,8 @@ pub(crate) fn along<const N_X: usize>(
     };
     let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &trend);
     let since = snapshot.step + p.input_delay;
-    let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, &hold), &trend);
-    let around = Surroundings { body, nominal: adapter.nominal(), hold: &hold };
+    let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, hold), &trend);
+    let around = Surroundings { body, nominal: adapter.nominal(), hold };
 
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);
@@ -119,13 +118,11 @@ pub(crate) fn along<const N_X: usize>(
             Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.x, &scheduled.u, path.mu),
             None => fixed(&mpc.tyres[i]),
         };
-        let linear = linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around);
-        *stage = Stage {
-            A: linear.A.map(|a| a.eps),
-            B: linear.B.map(|b| b.eps),
-            d: linear.d.map(|d| d.eps),
-            x_ref: linear.x_ref.map(|x| x.eps),
-        };
+        let (mut A, mut B) = (SMatrix::zeros(), SMatrix::zeros());
+        let (mut d, mut x_ref) = (SVector::zeros(), SVector::zeros());
+        let linear = Linear { A: &mut A, B: &mut B, d: &mut d, x_ref: &mut x_ref };
+        linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around, linear);
+        *stage = Stage { A: A.map(|a| a.eps), B: B.map(|b| b.eps), d: d.map(|d| d.eps), x_ref: x_ref.map(|x| x.eps) };
     }
     let tangent = mpc.structured.tangent(&mpc.problem, &mpc.solution, &change);
 
@@ -133,9 +130,10 @@ pub(crate) fn along<const N_X: usize>(
     output.delta = tangent.u[0][DELTA];
     output.a_x = tangent.u[0][A_X];
     let last = tangent.u.len() - 1;
-    for i in 0..HORIZON_MAX {
-        output.set_stage(i, &vehicle_part(&tangent.x[i.min(last) + 1]), &tangent.u[i.min(last)]);
+    for (i, (x, u)) in tangent.x[1..].iter().zip(&tangent.u).enumerate() {
+        output.set_stage(i, &vehicle_part(x), u);
     }
+    output.hold_from(last);
     // The slack is that of the worst stage.
     let excess = |i: &usize| mpc.problem.excess(&mpc.solution.x[*i]);
     if let Some(worst) = (1..=last + 1).max_by(|a, b| excess(a).total_cmp(&excess(b))).filter(|i| excess(i) > 0.0) {

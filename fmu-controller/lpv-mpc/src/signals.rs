@@ -4,11 +4,11 @@ use nalgebra::SVector;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
-use crate::ahead::{FRICTION_MIN, Road};
+use crate::ahead::{FRICTION_MIN, Road, Row};
 use crate::ladder::Status;
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Input, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::parameters::{HORIZON_MAX, Parameters};
-use crate::preview::Preview;
+use crate::preview::{PREVIEW, Preview};
 
 /// A predicted quantity over the horizon; beyond it the last value is repeated.
 pub type Trajectory = SVector<f64, HORIZON_MAX>;
@@ -86,24 +86,25 @@ impl Inputs {
 
     /// The previewed road.
     pub(crate) fn road(&self, p: &Parameters) -> Road {
-        Road::new(|i| self.element(i), p)
+        Road::new(self.rows(), p)
     }
 
     /// The previewed road with its derivative along a `direction` of the inputs.
     pub(crate) fn road_along(&self, direction: &Self, p: &Parameters) -> Road<Dual64> {
         // A preview that is held follows its first element.
         let direction = Self { hold_preview: self.hold_preview, ..direction.clone() };
-        let element = |i: usize| {
-            let (value, slope) = (self.element(i), direction.element(i));
-            std::array::from_fn(|k| Dual64::new(value[k], slope[k]))
-        };
-        Road::new(element, p)
+        let (values, slopes) = (self.rows(), direction.rows());
+        let dual = |k: usize| std::array::from_fn(|i| Dual64::new(values[k][i], slopes[k][i]));
+        Road::new(std::array::from_fn(dual), p)
     }
 
-    /// Element `i` of the preview: curvature [1/m], wanted speed [m/s] and friction [1].
-    fn element(&self, i: usize) -> [f64; 3] {
-        let i = if self.hold_preview { 0 } else { i };
-        [self.kappa_ref[i], self.v_x_ref[i], self.mu_ref[i]]
+    /// The previews of curvature [1/m], wanted speed [m/s] and friction [1].
+    #[inline(always)]
+    fn rows(&self) -> [Row<f64>; 3] {
+        [&self.kappa_ref, &self.v_x_ref, &self.mu_ref].map(|preview| {
+            let [row] = preview.data.0;
+            if self.hold_preview { [row[0]; PREVIEW] } else { row }
+        })
     }
 }
 
@@ -154,6 +155,22 @@ impl Output {
         self.yaw_rate_pred[i] = x[YAW_RATE];
         self.delta_pred[i] = u[DELTA];
         self.a_x_pred[i] = u[A_X];
+    }
+
+    /// Repeats element `last` of the predicted trajectories in all that follow.
+    pub(crate) fn hold_from(&mut self, last: usize) {
+        for trajectory in [
+            &mut self.e_y_pred,
+            &mut self.e_psi_pred,
+            &mut self.v_x_pred,
+            &mut self.v_y_pred,
+            &mut self.yaw_rate_pred,
+            &mut self.delta_pred,
+            &mut self.a_x_pred,
+        ] {
+            let (kept, held) = trajectory.as_mut_slice().split_at_mut(last + 1);
+            held.fill(kept[last]);
+        }
     }
 
     /// Before the first sample: no command, no plan, the nominal beliefs.

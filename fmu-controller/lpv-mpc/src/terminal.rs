@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::discretise::Hold;
 use crate::guide::Path;
-use crate::horizon::{Surroundings, linearise};
+use crate::horizon::{Linear, Surroundings, linearise};
 use crate::model::{Body, Disturbance, Input, NU, Point, State, Tyres, V_GUARD, V_X};
 use crate::modes::TerminalCost;
 use crate::parameters::Parameters;
-use crate::qp::Problem;
+use crate::qp::{Problem, Stage};
 
 /// States with the actuators, and the command that acts: the increments of the command are what the cost counts.
 const NZ: usize = crate::horizon::NX_LAGS + NU;
@@ -63,7 +63,8 @@ impl Terminal {
         let around = Surroundings { body, nominal: *tyres, hold };
         let mut x = State::zeros();
         x[V_X] = v_x;
-        let end = linearise::<f64, N_X>(&Point::new(x, Input::zeros()), &straight, tyres, &around);
+        let mut end = Stage::<N_X, NU>::default();
+        linearise(&Point::new(x, Input::zeros()), &straight, tyres, &around, Linear::from(&mut end));
         // Without a solution the weight of before stays; its speed was not far.
         if let Some(weight) = riccati(&end.A, &end.B, &problem.q, &problem.r) {
             problem.q_terminal = weight * self.factor;

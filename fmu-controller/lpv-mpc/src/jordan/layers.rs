@@ -13,6 +13,8 @@ pub const WIDTH_MAX: usize = 32;
 const LANES: usize = 8;
 /// Blocks of the widest layer.
 const BLOCKS: usize = WIDTH_MAX / LANES;
+/// Blocks of the layers of most networks: twice the paper's.
+const SMALL: usize = 2;
 /// Outputs of the last layer.
 const OUTPUTS: usize = FEEDBACK;
 
@@ -23,8 +25,8 @@ pub type Direction = [(usize, f64)];
 
 /// One block of neurons.
 type Block = [f64; LANES];
-/// The values of one layer.
-type Values = [Block; BLOCKS];
+/// The values of a layer of at most `B` blocks.
+type Values<const B: usize> = [Block; B];
 
 /// `y += a x`, side by side.
 #[inline(always)]
@@ -112,7 +114,7 @@ impl Inner {
 
     /// The sums of a block of neurons whose inputs are `x`.
     #[inline(always)]
-    fn sums(&self, block: usize, x: &Values) -> Block {
+    fn sums<const B: usize>(&self, block: usize, x: &Values<B>) -> Block {
         let mut sums = self.biases[block];
         for (tile, x) in self.tiles[block].iter().zip(x) {
             for i in 0..LANES {
@@ -124,7 +126,7 @@ impl Inner {
 
     /// How they change with inputs that change along both directions.
     #[inline(always)]
-    fn sums_along(&self, block: usize, [x, y]: &[Values; OUTPUTS]) -> [Block; OUTPUTS] {
+    fn sums_along<const B: usize>(&self, block: usize, [x, y]: &[Values<B>; OUTPUTS]) -> [Block; OUTPUTS] {
         let mut sums = [[0.0; LANES]; OUTPUTS];
         for ((tile, x), y) in self.tiles[block].iter().zip(x).zip(y) {
             for i in 0..LANES {
@@ -140,7 +142,7 @@ impl Inner {
 type Last = [(Vec<Block>, f64); OUTPUTS];
 
 #[inline(always)]
-fn dot(weights: &[Block], x: &Values) -> f64 {
+fn dot<const B: usize>(weights: &[Block], x: &Values<B>) -> f64 {
     let mut products = [0.0; LANES];
     for (weights, x) in weights.iter().zip(x) {
         for lane in 0..LANES {
@@ -151,13 +153,13 @@ fn dot(weights: &[Block], x: &Values) -> f64 {
 }
 
 /// The values of one layer, and their changes along the directions.
-struct Jets {
-    value: Values,
-    along: [Values; OUTPUTS],
+struct Jets<const B: usize> {
+    value: Values<B>,
+    along: [Values<B>; OUTPUTS],
 }
 
-impl Jets {
-    const ZERO: Self = Self { value: [[0.0; LANES]; BLOCKS], along: [[[0.0; LANES]; BLOCKS]; OUTPUTS] };
+impl<const B: usize> Jets<B> {
+    const ZERO: Self = Self { value: [[0.0; LANES]; B], along: [[[0.0; LANES]; B]; OUTPUTS] };
 
     /// The neurons of a block from their sums.
     #[inline(always)]
@@ -182,6 +184,8 @@ pub struct Layers {
     first: First,
     inner: Vec<Inner>,
     last: Option<Last>,
+    /// Most blocks of a hidden layer.
+    widest: usize,
 }
 
 impl Layers {
@@ -198,47 +202,56 @@ impl Layers {
         }
         let (first, others) = layers.split_first().expect("a checked document has a layer");
         let Some((last, inner)) = others.split_last() else {
-            return Self { first: First::new(first, directions, (1.0, 1.0)), inner: Vec::new(), last: None };
+            return Self { first: First::new(first, directions, (1.0, 1.0)), inner: Vec::new(), last: None, widest: 0 };
         };
+        let hidden = 0..layers.len() - 1;
+        let widest = hidden.map(|i| layers[i].biases.len().div_ceil(LANES)).max().unwrap_or(0);
         // The weights of the inner layers carry the factor of the exponent, which the changes must not.
         let change = inner.iter().fold(1.0, |change, _| change / TO_EXPONENT);
         Self {
             first: First::new(first, directions, (TO_EXPONENT, change)),
             inner: inner.iter().map(|layer| Inner::new(layer, TO_EXPONENT)).collect(),
             last: Some(std::array::from_fn(|o| (in_blocks(last.weights[o].iter().copied()), last.biases[o]))),
+            widest,
         }
     }
 
     /// The two outputs at the input `x`.
     #[inline]
     pub fn forward(&self, x: &Inputs) -> [f64; OUTPUTS] {
-        self.pass::<false>(x).0
+        if self.is_small() { self.pass::<false, SMALL>(x).0 } else { self.pass::<false, BLOCKS>(x).0 }
     }
 
     /// The two outputs at the input `x`, and how each changes along its direction.
     #[inline]
     pub fn forward_along(&self, x: &Inputs) -> ([f64; OUTPUTS], [f64; OUTPUTS]) {
-        self.pass::<true>(x)
+        if self.is_small() { self.pass::<true, SMALL>(x) } else { self.pass::<true, BLOCKS>(x) }
     }
 
     #[inline(always)]
-    fn pass<const ALONG: bool>(&self, x: &Inputs) -> ([f64; OUTPUTS], [f64; OUTPUTS]) {
-        let Self { first, inner, last } = self;
+    fn is_small(&self) -> bool {
+        self.widest <= SMALL
+    }
+
+    /// Through layers of at most `B` blocks.
+    #[inline(always)]
+    fn pass<const ALONG: bool, const B: usize>(&self, x: &Inputs) -> ([f64; OUTPUTS], [f64; OUTPUTS]) {
+        let Self { first, inner, last, .. } = self;
         let Some(last) = last else {
             let sums = first.sums(0, x);
             return (std::array::from_fn(|o| sums[o]), std::array::from_fn(|o| first.along[o][0][o]));
         };
-        let (mut one, mut other) = (Jets::ZERO, Jets::ZERO);
+        let (mut one, mut other) = (Jets::<B>::ZERO, Jets::<B>::ZERO);
         let (mut now, mut next) = (&mut one, &mut other);
         // No layer is wider; said here, it spares checks of every block.
-        for block in 0..first.biases.len().min(BLOCKS) {
+        for block in 0..first.biases.len().min(B) {
             now.activate(block, first.sums(block, x));
             if ALONG {
                 now.activate_along(block, first.along.each_ref().map(|along| &along[block]));
             }
         }
         for layer in inner {
-            for block in 0..layer.biases.len().min(BLOCKS) {
+            for block in 0..layer.biases.len().min(B) {
                 next.activate(block, layer.sums(block, &now.value));
                 if ALONG {
                     next.activate_along(block, layer.sums_along(block, &now.along).each_ref());
