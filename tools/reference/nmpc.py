@@ -1,8 +1,10 @@
 """The ceiling that the report compares with: nonlinear MPC that knows the plant exactly, solved offline.
 
 Every 33 ms IPOPT (through CasADi) plans 30 samples ahead on the plant's own equations, with its tyre, its friction and the
-wind that is going to blow, and with the weights and bounds that the controller's FMU declares. The plant FMU is driven with
-the first command at once: no time passes while the plan is made. No controller in a car can have any of this.
+wind, and with the weights and bounds that the controller's FMU declares. The plant FMU is driven with the first command at
+once: no time passes while the plan is made. No controller in a car can have any of this.
+
+Of the wind it foresees what is going to blow, or it feels what blows now and expects that to go on, or it is told nothing.
 
 The runs are stored in nmpc.zip beside this script, one table for each, with the weights that they were made with:
 
@@ -61,13 +63,14 @@ def calm(_time, _s):
     return 0.0
 
 
-# Road, whether the wind is an input of the plant, and its speed over time and place.
+# Road, whether the wind is an input of the plant, its speed over time and place, and what the planner knows of it.
 RUNS = {
-    "lane_change": ("double_lane_change", False, calm),
-    "lane_change_wind": ("double_lane_change", True, lane_change_wind),
-    "general": ("general", False, general_wind),
-    # The wind blows all the same; the planner is not told.
-    "general_untold": ("general", False, calm),
+    "lane_change": ("double_lane_change", False, calm, "foreseen"),
+    "lane_change_wind": ("double_lane_change", True, lane_change_wind, "foreseen"),
+    "lane_change_wind_felt": ("double_lane_change", True, lane_change_wind, "felt"),
+    "general": ("general", False, general_wind, "foreseen"),
+    "general_felt": ("general", False, general_wind, "felt"),
+    "general_untold": ("general", False, general_wind, "untold"),
 }
 
 
@@ -218,9 +221,21 @@ class Planner:
         return self.guess[1][0], taken, stats["iter_count"], stats["success"]
 
 
+def blow(wind, known, now, s, v_ref):
+    """Speed of the wind [m/s] that the planner expects in each stage."""
+    if known == "untold":
+        return np.zeros(HORIZON + 1)
+    if known == "felt":
+        return np.full(HORIZON + 1, wind(now, s))
+    # In the middle of each stage, where the reference is going to be.
+    place = s + np.concatenate([[0.0], np.cumsum(T_S * 0.5 * (v_ref[:-1] + v_ref[1:]))])
+    time_ = now + (np.arange(HORIZON + 1) + 0.5) * T_S
+    return wind(time_, place + 0.5 * T_S * v_ref) * np.ones(HORIZON + 1)
+
+
 def drive(plant_archive, controller_archive, run, seconds=np.inf):
     """Rows of one run, and the weights that it was made with."""
-    road, wind_is_input, wind = RUNS[run]
+    road, wind_is_input, wind, known = RUNS[run]
     plant = Plant(plant_archive, road)
     starts = {v.name: v.start for v in fmpy.read_model_description(controller_archive).modelVariables}
     weights, bounds = ({name: float(starts[name]) for name in names} for names in (WEIGHTS, BOUNDS))
@@ -233,9 +248,7 @@ def drive(plant_archive, controller_archive, run, seconds=np.inf):
         while not plant.finished() and sample_number * T_S < seconds:
             now = sample_number * T_S
             start, kappa, v_ref = plant.get(state_names), plant.get(kappa_names), plant.get(speed_names)
-            # In the middle of each stage, where the reference is going to be.
-            place = plant.get(["s"])[0] + np.concatenate([[0.0], np.cumsum(T_S * 0.5 * (v_ref[:-1] + v_ref[1:]))])
-            blowing = wind(now + (ahead + 0.5) * T_S, place + 0.5 * T_S * v_ref) * np.ones(HORIZON + 1)
+            blowing = blow(wind, known, now, plant.get(["s"])[0], v_ref)
             command, taken, iterations, content = planner.plan(start, before, kappa, blowing, v_ref)
             if not content:
                 raise RuntimeError(f"no optimal plan at {now:.3f} s: {planner.solver.stats()['return_status']}")

@@ -17,6 +17,7 @@ pub(crate) const GREY: &str = "#8a97a3";
 pub(crate) const GREEN: &str = "#2f9e6e";
 pub(crate) const RED: &str = "#d1495b";
 pub(crate) const PURPLE: &str = "#9272d6";
+pub(crate) const TEAL: &str = "#17a2b8";
 
 /// Points of a curve that a page carries: more than a screen has columns.
 const POINTS: usize = 1600;

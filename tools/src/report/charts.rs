@@ -67,7 +67,7 @@ impl<'a> Figure<'a> {
         let curves = self.runs.iter().filter(|run| select(run.who)).map(|run| {
             let curve =
                 Curve::new(run.who.name(), &run.recording.column("t"), quantity(&run.recording), run.who.color());
-            if run.who == Who::Nonlinear { curve.dashed() } else { curve }
+            if matches!(run.who, Who::Nonlinear(_)) { curve.dashed() } else { curve }
         });
         chart(["", title, note], [TIME, axis], curves.collect()).named(self.id(id)).zoomed(None, self.scale(quantity))
     }
@@ -75,7 +75,7 @@ impl<'a> Figure<'a> {
     /// All charts of the situation, in the order of the paper's figures.
     pub fn charts(&self) -> Vec<Chart> {
         let all = |_: Who| true;
-        let best = |who: Who| matches!(who, Who::Ours | Who::Nonlinear);
+        let best = |who: Who| matches!(who, Who::Ours | Who::Nonlinear(_));
         vec![
             self.wind(),
             self.speed(),

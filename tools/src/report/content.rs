@@ -10,7 +10,7 @@ pub use misprints::late;
 
 use super::errata::Shot;
 use super::learning::Learning;
-use super::runs::{Figures, Run, Situation, Who};
+use super::runs::{Figures, Run, Situation, Who, Wind};
 use super::verdict::{Verdict, verdicts};
 use crate::baselines::Gains;
 use crate::html::{escape, table};
@@ -50,7 +50,7 @@ impl Findings {
 
     /// What was promised, and whether it holds.
     pub fn verdicts(&self) -> Vec<Verdict> {
-        verdicts(&self.runs, [self.times(Who::Ours), self.times(Who::Nonlinear)])
+        verdicts(&self.runs, [self.times(Who::Ours), self.times(Who::Nonlinear(Wind::Foreseen))])
     }
 }
 

@@ -129,9 +129,11 @@ fn find(args: &Args, output: &Output) -> Result<Findings> {
     // One after the other: a timing beside other work measures the other work.
     let mut times = Vec::new();
     for who in Who::ALL {
-        let seconds = match timing::times(who)? {
-            Some(seconds) => seconds,
-            None => reference.times(Situation::General.id())?,
+        let seconds = match who {
+            Who::Ours => timing::times(None)?,
+            Who::Baseline(baseline) => timing::times(Some(baseline))?,
+            // Timed when they were made.
+            Who::Nonlinear(wind) => reference.times(&runs::stored(Situation::General, wind))?,
         };
         times.push((who, seconds));
         bar.inc(1);

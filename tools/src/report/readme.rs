@@ -97,8 +97,9 @@ fn results() -> Result<String> {
         "\nThe paper calls its rms figures \"MSE\"; read as such they would exceed its own maxima. Its plant, track and wind are not\n\
          published, so the columns show the order of magnitude, not a contest. The course is the direction of motion: the body itself cannot\n\
          keep the path's heading in a curve, whoever steers.\n\n\
-         What a user would otherwise pick, and as a ceiling a nonlinear MPC that knows the plant and the coming wind, solved offline\n\
-         (`tools/reference/nmpc.py`); root mean squares:\n\n",
+         What a user would otherwise pick, and as a ceiling a nonlinear MPC with our weights, solved offline (`tools/reference/nmpc.py`).\n\
+         It knows the plant, loses no time, and is told the wind: what blows now (felt, as ours does through the car), or what is going\n\
+         to blow (foreseen). Root mean squares:\n\n",
     );
     text.push_str(&comparison()?);
     text.push_str(
@@ -164,8 +165,8 @@ fn comparison() -> Result<String> {
         let mut row = vec![who.name().to_owned()];
         for figures in figures {
             if figures.stayed() {
-                row.push(format!("{:.2}", 100.0 * figures.tracking.e_y_rms));
-                row.push(format!("{:.4}", figures.tracking.speed_rms));
+                row.push(format!("{:.3}", 100.0 * figures.tracking.e_y_rms));
+                row.push(format!("{:.5}", figures.tracking.speed_rms));
             } else {
                 row.extend(["off the road".to_owned(), String::new()]);
             }

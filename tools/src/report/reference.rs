@@ -98,8 +98,14 @@ mod tests {
     #[test]
     fn every_stored_run_reaches_the_end_of_its_road() {
         let reference = Reference::open().unwrap();
-        let runs =
-            [("lane_change", 200.0), ("lane_change_wind", 200.0), ("general", 2000.0), ("general_untold", 2000.0)];
+        let runs = [
+            ("lane_change", 200.0),
+            ("lane_change_wind", 200.0),
+            ("lane_change_wind_felt", 200.0),
+            ("general", 2000.0),
+            ("general_felt", 2000.0),
+            ("general_untold", 2000.0),
+        ];
         for (id, length) in runs {
             let run = reference.run(id).unwrap();
             let last = *run.column("s").last().unwrap();

@@ -7,7 +7,7 @@ use vehicle::Vehicle;
 
 use super::reference::Reference;
 use crate::baselines::Baseline;
-use crate::plots::{BLUE, GREEN, GREY, ORANGE, PURPLE, RED};
+use crate::plots::{BLUE, GREEN, GREY, ORANGE, PURPLE, RED, TEAL};
 use crate::recording::{Recording, Tracking, max, rms};
 use crate::simulate::build;
 use crate::simulate::native::{Driver, drive_in};
@@ -60,6 +60,15 @@ impl Situation {
     }
 }
 
+/// What the nonlinear MPC knows of the wind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wind {
+    /// What blows now: as much as a controller with perfect sensors can know.
+    Felt,
+    /// What is going to blow.
+    Foreseen,
+}
+
 /// Who drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Who {
@@ -68,14 +77,15 @@ pub enum Who {
     /// What a user would otherwise pick.
     Baseline(Baseline),
     /// Nonlinear MPC that knows the plant, solved offline and stored.
-    Nonlinear,
+    Nonlinear(Wind),
 }
 
 impl Who {
     /// All of them, ours first.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Ours,
-        Self::Nonlinear,
+        Self::Nonlinear(Wind::Felt),
+        Self::Nonlinear(Wind::Foreseen),
         Self::Baseline(Baseline::LinearFixed),
         Self::Baseline(Baseline::LinearMeasured),
         Self::Baseline(Baseline::Stanley),
@@ -86,7 +96,8 @@ impl Who {
     pub fn name(self) -> &'static str {
         match self {
             Self::Ours => "LPV-MPC (ours)",
-            Self::Nonlinear => "nonlinear MPC (offline)",
+            Self::Nonlinear(Wind::Felt) => "nonlinear MPC (offline), wind felt",
+            Self::Nonlinear(Wind::Foreseen) => "nonlinear MPC (offline), wind foreseen",
             Self::Baseline(baseline) => baseline.name(),
         }
     }
@@ -95,7 +106,8 @@ impl Who {
     pub fn id(self) -> &'static str {
         match self {
             Self::Ours => "ours",
-            Self::Nonlinear => "nonlinear",
+            Self::Nonlinear(Wind::Felt) => "nonlinear_felt",
+            Self::Nonlinear(Wind::Foreseen) => "nonlinear",
             Self::Baseline(Baseline::LinearFixed) => "lmpc",
             Self::Baseline(Baseline::LinearMeasured) => "lmpc_measured",
             Self::Baseline(Baseline::Stanley) => "stanley",
@@ -107,7 +119,8 @@ impl Who {
     pub fn color(self) -> &'static str {
         match self {
             Self::Ours => BLUE,
-            Self::Nonlinear => GREY,
+            Self::Nonlinear(Wind::Felt) => TEAL,
+            Self::Nonlinear(Wind::Foreseen) => GREY,
             Self::Baseline(Baseline::LinearFixed) => ORANGE,
             Self::Baseline(Baseline::LinearMeasured) => RED,
             Self::Baseline(Baseline::Stanley) => GREEN,
@@ -188,10 +201,16 @@ pub fn run(situation: Situation, who: Who, reference: &Reference) -> Result<Run>
             let mut driver = baseline.driver(&settings.controller, plant.road());
             drive(situation, &mut plant, &mut driver, STEP)?
         }
-        Who::Nonlinear => reference.run(situation.id())?,
+        Who::Nonlinear(wind) => reference.run(&stored(situation, wind))?,
     };
     let figures = Figures::of(&recording);
     Ok(Run { situation, who, recording, figures })
+}
+
+/// Name of the nonlinear MPC's run; without wind there is one.
+pub fn stored(situation: Situation, wind: Wind) -> String {
+    let felt = wind == Wind::Felt && situation != Situation::LaneChange;
+    format!("{}{}", situation.id(), if felt { "_felt" } else { "" })
 }
 
 /// All runs, in the order of the page; `tick` is called after each.

@@ -5,7 +5,8 @@ use std::time::Instant;
 use anyhow::Result;
 use lpv_mpc::Inputs;
 
-use super::runs::{Situation, Who, drive, prepare};
+use super::runs::{Situation, drive, prepare};
+use crate::baselines::Baseline;
 use crate::simulate::native::{Driver, Shown};
 
 /// Runs of which each sample's shortest time counts: what else the machine did is not the controller's.
@@ -31,25 +32,21 @@ impl<D: Driver> Driver for Timed<D> {
     }
 }
 
-/// Computing times of all samples of a drive over the general track, one sample in each communication step [s].
-///
-/// Nothing for the stored runs, which were timed when they were made.
-pub fn times(who: Who) -> Result<Option<Vec<f64>>> {
-    if who == Who::Nonlinear {
-        return Ok(None);
-    }
+/// Computing times of all samples of a drive over the general track, one sample in each communication step [s]; without a
+/// baseline it is our controller's.
+pub fn times(baseline: Option<Baseline>) -> Result<Vec<f64>> {
     let mut best: Vec<f64> = Vec::new();
     for _ in 0..REPEATS {
         let (mut plant, controller, settings) = prepare(Situation::General, &[])?;
         let step = settings.controller.t_s;
-        let times = match who {
-            Who::Baseline(baseline) => {
+        let times = match baseline {
+            Some(baseline) => {
                 let mut driver =
                     Timed { driver: baseline.driver(&settings.controller, plant.road()), times: Vec::new() };
                 drive(Situation::General, &mut plant, &mut driver, step)?;
                 driver.times
             }
-            _ => {
+            None => {
                 let mut driver = Timed { driver: controller, times: Vec::new() };
                 drive(Situation::General, &mut plant, &mut driver, step)?;
                 driver.times
@@ -57,7 +54,7 @@ pub fn times(who: Who) -> Result<Option<Vec<f64>>> {
         };
         best = if best.is_empty() { times } else { best.iter().zip(&times).map(|(a, b)| a.min(*b)).collect() };
     }
-    Ok(Some(best))
+    Ok(best)
 }
 
 /// Value that a share of the samples does not exceed.

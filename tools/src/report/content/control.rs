@@ -6,7 +6,7 @@ use crate::plots::Page;
 use crate::recording::{PAPER, Recording};
 use crate::report::charts::Figure;
 use crate::report::data_file;
-use crate::report::runs::{Figures, ROAD, Run, Situation, Who};
+use crate::report::runs::{Figures, ROAD, Run, Situation, Who, Wind};
 use crate::report::verdict::find;
 
 /// Names and units of the table of a situation.
@@ -45,7 +45,7 @@ pub fn overview(runs: &[Run], situation: Situation) -> Vec<Vec<String>> {
 
 /// A run as its table shows it: a sample of each period of the controller.
 pub fn samples(run: &Run) -> Recording {
-    if run.who == Who::Nonlinear { run.recording.clone() } else { run.recording.thinned(33) }
+    if matches!(run.who, Who::Nonlinear(_)) { run.recording.clone() } else { run.recording.thinned(33) }
 }
 
 /// The section.
@@ -61,7 +61,7 @@ sampled every 33 ms, with the same bounds, from the same signals. Who gets what:
 | | model | preview | wind | latency |
 |---|---|---|---|---|
 | LPV-MPC (ours) | LPV, tyres from the network along the plan | curvature, speed | estimated from what the model cannot explain | predicted over |
-| nonlinear MPC (offline) | the plant itself, 30 samples ahead | curvature, speed | known, also ahead | none: commands act at once |
+| nonlinear MPC (offline) | the plant itself, 30 samples ahead | curvature, speed | told: what blows now (felt), or what is going to blow (foreseen) | none: commands act at once |
 | LMPC + PID | linear bicycle at one speed between the road's mean and highest, nominal tyres | curvature, speed | not known | predicted over |
 | LMPC at measured speed + PID | the same, linearised at each sample | curvature, speed | not known | predicted over |
 | Stanley + PID | none | curvature now | not known | none |
@@ -111,7 +111,7 @@ fn weighted(page: &mut Page, findings: &Findings) {
 /// What the table of a situation says, in a sentence.
 fn difference(runs: &[Run], situation: Situation) -> String {
     let of = |who| find(runs, situation, who).figures;
-    let (ours, best) = (of(Who::Ours), of(Who::Nonlinear));
+    let ours = of(Who::Ours);
     let ratio = |a: f64, b: f64| format!("{:.1}", a / b);
     let fixed = of(Who::Baseline(Baseline::LinearFixed));
     let behind = if fixed.stayed() {
@@ -126,9 +126,19 @@ fn difference(runs: &[Run], situation: Situation) -> String {
             "The paper's comparison, LMPC at one speed with PID, comes further than {ROAD} m from the path: off the road."
         )
     };
+    let [felt, foreseen] = [Wind::Felt, Wind::Foreseen].map(|wind| {
+        let best = of(Who::Nonlinear(wind)).tracking;
+        format!(
+            "{} times in position and {} times in speed",
+            ratio(ours.tracking.e_y_rms, best.e_y_rms),
+            ratio(ours.tracking.speed_rms, best.speed_rms)
+        )
+    });
+    if situation == Situation::LaneChange {
+        return format!("{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}.\n");
+    }
     format!(
-        "{behind} Of the nonlinear MPC, which knows plant and wind, ours is within a factor of {} in position and {} in speed.\n",
-        ratio(ours.tracking.e_y_rms, best.tracking.e_y_rms),
-        ratio(ours.tracking.speed_rms, best.tracking.speed_rms)
+        "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt} when it feels the wind, as ours \
+         does through the car, {foreseen} when it foresees it.\n"
     )
 }
