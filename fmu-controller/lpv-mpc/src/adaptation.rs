@@ -97,6 +97,7 @@ impl Adapter {
     }
 
     /// The next memory, secants, tangents and confidence at a state and input.
+    #[inline(always)]
     fn answer(&self, memory: &Memory, x: &State, u: &Input, mu: f64) -> (Memory, Tyres, Tyres, f64) {
         let Some((memory, belief)) = self.ask(memory, x, u) else {
             let (secant, tangent) = self.grip.tyres(&self.nominal, x, u, mu);
@@ -158,6 +159,7 @@ impl Adapter {
     }
 
     /// The network's answer, unless there is none to ask or the car is slower than any slip angle makes sense.
+    #[inline(always)]
     fn ask(&self, memory: &Memory, x: &State, u: &Input) -> Option<(Memory, Belief)> {
         if x[V_X] < V_GUARD {
             return None;
@@ -243,6 +245,7 @@ impl TyreModel for Adapter {
         self.rolled = self.memory;
     }
 
+    #[inline(always)]
     fn at(&mut self, x: &State, u: &Input, mu: f64) -> Tyres {
         match self.mode {
             Adaptation::Constant => self.nominal,

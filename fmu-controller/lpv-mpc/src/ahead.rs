@@ -66,6 +66,7 @@ impl<T: Scalar> Road<T> {
     }
 
     /// Finds a distance [m], looking from the place found `last` on: a plan goes forward.
+    #[inline(always)]
     pub fn find(&self, s: T, last: usize) -> Place<T> {
         let mut before = last;
         // A distance that is no number lies nowhere, and what is found there is no number either.
@@ -83,6 +84,7 @@ impl<T: Scalar> Road<T> {
     }
 
     /// Wanted speed after `time` [s] on the reference [m/s].
+    #[inline(always)]
     pub fn wanted(&self, time: f64) -> T {
         let position = (time / self.period).clamp(0.0, (PREVIEW - 1) as f64);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the preview above")]
@@ -96,6 +98,7 @@ impl<T: Scalar> Road<T> {
     }
 
     /// Curvature [1/m] and friction [1] at a place, and the speed that grip permits there [m/s].
+    #[inline(always)]
     pub fn at(&self, place: &Place<T>) -> (T, T, T) {
         (place.of(&self.kappa), place.of(&self.mu), place.of(&self.limit))
     }
@@ -107,6 +110,7 @@ impl<T: Scalar> Place<T> {
         self.before
     }
 
+    #[inline(always)]
     fn of(&self, row: &Row<T>) -> T {
         row[self.before] + self.fraction * (row[self.before + 1] - row[self.before])
     }

@@ -67,6 +67,7 @@ struct Reach<T> {
 }
 
 impl<T: Scalar> Reach<T> {
+    #[inline(always)]
     fn advance(&mut self, period: f64) {
         let to_bound = self.bound - self.command;
         self.command += to_bound.clamp(-self.step, self.step);
@@ -116,12 +117,18 @@ impl<'a, T: Scalar> Guide<'a, T> {
         }
     }
 
+    /// Time between the measurement and the present stage [s].
+    pub fn latency(&self) -> f64 {
+        self.time
+    }
+
     /// The same, no faster than `pace` [m/s].
     pub fn no_faster_than(self, pace: f64) -> Self {
         Self { pace, ..self }
     }
 
     /// The path under the next stage, on which the car makes way at `pace` [m/s].
+    #[inline(always)]
     pub fn advance(&mut self, pace: impl FnOnce(T) -> T) -> Path<T> {
         self.s += pace(self.kappa) * self.period;
         self.time += self.period;

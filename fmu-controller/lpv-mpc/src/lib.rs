@@ -23,6 +23,7 @@
 pub mod adaptation;
 mod ahead;
 mod angles;
+mod caution;
 pub mod controller;
 pub mod discretise;
 mod error;
@@ -32,6 +33,7 @@ mod guide;
 mod horizon;
 pub mod jordan;
 mod ladder;
+mod lanes;
 pub mod latency;
 pub mod model;
 mod modes;

@@ -8,9 +8,11 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
+use crate::caution::caution;
 use crate::discretise::Hold;
 use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
+use crate::lanes::{Work, widest};
 use crate::latency::Predicted;
 use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::modes::Backend;
@@ -71,6 +73,8 @@ pub struct Mpc<const N_X: usize> {
     terminal: Terminal,
     /// Largest change of the steering per period [rad].
     steering_step: f64,
+    /// Weight of the steering increments when there is no need for caution [1/rad2].
+    r_delta: f64,
     /// Fastest speed that was soon wanted when the last plan was made [m/s].
     fastest: f64,
     /// The plan that is executed.
@@ -96,6 +100,7 @@ impl<const N_X: usize> Mpc<N_X> {
             soft_bound: p.e_y_max,
             terminal: Terminal::new(p),
             steering_step: p.delta_rate_max * p.t_s,
+            r_delta: p.r_delta,
             fastest: f64::INFINITY,
             plan: Plan::none(p.horizon),
             schedule: Plan::none(p.horizon),
@@ -118,6 +123,7 @@ impl<const N_X: usize> Mpc<N_X> {
         problem.q_terminal = SMatrix::from_diagonal(&(problem.q * p.terminal_factor));
         self.terminal = Terminal::new(p);
         problem.r = Input::from([p.r_delta, p.r_a_x]);
+        self.r_delta = p.r_delta;
         problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
         problem.u_max = Input::from([p.delta_max, p.a_x_max]);
         problem.du_max = Input::from([p.delta_rate_max, p.a_x_rate_max]) * p.t_s;
@@ -152,6 +158,8 @@ impl<const N_X: usize> Mpc<N_X> {
         let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
         self.problem.du_max[DELTA] = if stands { 0.0 } else { self.steering_step };
         self.problem.soft_bound = self.soft_bound + recovery.map_or(0.0, |recovery| recovery.room);
+        // Planned speeds: weights do not depend on the measurement, which keeps the derivative exact.
+        self.problem.r[DELTA] = self.r_delta * caution(self.plan.x[1][V_X], guide.latency());
         let speed = self.plan.x[self.plan.x.len() - 1][V_X];
         self.terminal.weigh(&mut self.problem, speed, &tyres.nominal(), hold, body);
         let passes = if continues { 1 } else { FIRST_PASSES };
@@ -160,7 +168,7 @@ impl<const N_X: usize> Mpc<N_X> {
             if !continues {
                 self.schedule.forget();
             }
-            self.model((guide.clone(), recovery), hold, body, tyres);
+            widest(Modelling { mpc: self, guide: guide.clone(), recovery, hold, body, tyres });
             if !self.solve() {
                 break;
             }
@@ -204,6 +212,7 @@ impl<const N_X: usize> Mpc<N_X> {
     }
 
     /// Fills the stages of the quadratic programme along the schedule.
+    #[inline(always)]
     fn model(
         &mut self,
         (mut guide, recovery): (Guide<'_, f64>, Option<&Recovery>),
@@ -241,6 +250,26 @@ impl<const N_X: usize> Mpc<N_X> {
         }
         self.clarabel.solve(&self.problem, &mut self.solution);
         self.solution.outcome.is_solved()
+    }
+}
+
+/// [`Mpc::model`] with its arguments.
+struct Modelling<'a, const N_X: usize, M> {
+    mpc: &'a mut Mpc<N_X>,
+    guide: Guide<'a, f64>,
+    recovery: Option<&'a Recovery>,
+    hold: &'a Hold,
+    body: &'a Body,
+    tyres: &'a mut M,
+}
+
+impl<const N_X: usize, M: TyreModel> Work for Modelling<'_, N_X, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { mpc, guide, recovery, hold, body, tyres } = self;
+        mpc.model((guide, recovery), hold, body, tyres);
     }
 }
 

@@ -53,6 +53,7 @@ impl<const N_X: usize> Plan<N_X> {
     }
 
     /// Becomes `plan`, and less of it the more its steering differs from what stands here.
+    #[inline(always)]
     pub fn take(&mut self, plan: &Self) {
         let steering = plan.u.iter().zip(&self.u).map(|(planned, scheduled)| (planned - scheduled)[DELTA].abs());
         let largest = steering.fold(0.0, |largest, change| if change > largest { change } else { largest });

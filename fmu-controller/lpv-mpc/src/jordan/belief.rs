@@ -44,6 +44,7 @@ pub struct Belief {
 impl Belief {
     /// Forces proportional to slip.
     #[must_use]
+    #[inline]
     pub fn secant(&self) -> Tyres {
         Tyres::secant(self.front.secant, self.rear.secant)
     }
@@ -53,6 +54,7 @@ impl Belief {
     /// The force at the stage's own slip is the secant's. A tangent stiffness below `floor` times the secant one is held
     /// there: a prediction model with negative stiffness runs away within a horizon.
     #[must_use]
+    #[inline]
     pub fn tangent(&self, floor: f64) -> Tyres {
         let line = |axle: &Axle| {
             let slope = axle.tangent.max(floor * axle.secant);
@@ -70,6 +72,7 @@ impl Network {
     /// that move the front slip alone and the rear slip alone the network is differentiated exactly; the memory is held, being
     /// the past.
     #[must_use]
+    #[inline(always)]
     pub fn linearise(&self, memory: &Memory, measured: &Measured) -> (Memory, Belief) {
         let Document { l_f, l_r, outputs, .. } = &self.document;
         let (z_f, z_r) = self.drift(measured);

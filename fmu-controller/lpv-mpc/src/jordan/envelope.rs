@@ -61,6 +61,7 @@ pub struct Envelope {
 
 impl Envelope {
     /// 1 where the training was, falling smoothly to 0 over [`MARGIN`] outside; several excesses multiply.
+    #[inline(always)]
     pub fn belief(&self, inputs: &[f64], (alpha_f, alpha_r): (f64, f64)) -> f64 {
         // Written without branches: mostly all are inside.
         let inside = self.inputs.iter().zip(inputs).fold(true, |inside, (range, &value)| inside & range.holds(value));

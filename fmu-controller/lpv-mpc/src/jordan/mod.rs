@@ -171,21 +171,21 @@ impl Network {
     }
 
     /// Tangents of the angles at which the front and the rear axle move against the body [1].
-    #[inline]
+    #[inline(always)]
     fn drift(&self, measured: &Measured) -> (f64, f64) {
         let Document { l_f, l_r, .. } = self.document;
         let Measured { v_x, v_y, yaw_rate, .. } = *measured;
         ((v_y + l_f * yaw_rate) / v_x, (v_y - l_r * yaw_rate) / v_x)
     }
 
-    #[inline]
+    #[inline(always)]
     fn belief(&self, measured: &Measured, slip_angles: (f64, f64)) -> f64 {
         let n = self.document.inputs.len();
         self.document.envelope.belief(&measured.values()[..n], slip_angles)
     }
 
     /// What the layers see: the measured inputs, followed by the memory.
-    #[inline]
+    #[inline(always)]
     fn seen(&self, memory: &Memory, measured: &Measured) -> Inputs {
         let Measured { v_x, v_y, yaw_rate, delta, a_x, a_y, yaw_acceleration } = *measured;
         let Memory { c_f, c_r } = *memory;

@@ -1,0 +1,89 @@
+//! The one door to vector instructions beyond those that every 64-bit processor has.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// What may be done with wider vectors. Only what is inlined into [`Work::run`] is.
+pub trait Work {
+    /// What comes of it.
+    type Output;
+
+    /// Does it; to be marked as always inlined.
+    fn run(self) -> Self::Output;
+}
+
+struct Lanes<W>(W);
+
+impl<W: Work> WithSimd for Lanes<W> {
+    type Output = W::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> W::Output {
+        self.0.run()
+    }
+}
+
+/// Does `work` with the widest vectors that the processor at hand has.
+///
+/// Nothing is reordered or fused for them, so the bits are the same on every processor.
+#[inline(always)]
+pub fn widest<W: Work>(work: W) -> W::Output {
+    Arch::new().dispatch(Lanes(work))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    use crate::Parameters;
+    use crate::discretise::{Discrete, Hold, discretise_into};
+    use crate::jordan::{Belief, Measured, Memory, Network};
+    use crate::model::{Disturbance, Input, Point, State, embed_at};
+
+    /// What the model of a stage consists of.
+    struct Stage<'a> {
+        network: &'a Network,
+        memory: Memory,
+        x: State,
+        u: Input,
+        hold: &'a Hold,
+    }
+
+    impl Work for Stage<'_> {
+        type Output = (Memory, Belief, Discrete<f64, 7>, f64);
+
+        #[inline(always)]
+        fn run(self) -> Self::Output {
+            let Self { network, memory, x, u, hold } = self;
+            let [v_x, v_y, yaw_rate, _, _] = x.into();
+            let measured = Measured { v_x, v_y, yaw_rate, delta: u[0], a_x: u[1], ..Measured::default() };
+            let (memory, belief) = network.linearise(&memory, &measured);
+            let (tyres, point) = (belief.tangent(0.05), Point::new(x, u));
+            let p = Parameters::default();
+            let lpv = embed_at(&point, 0.02, &p.body(), &tyres, &Disturbance::zeros());
+            let mut sample = Discrete::zeros();
+            let Discrete { Phi, Gamma, d } = &mut sample;
+            discretise_into(&lpv, hold, Phi, Gamma, d);
+            (memory, belief, sample, point.progress(0.02))
+        }
+    }
+
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        let network = Network::from_json(include_str!("../../resources/jordan.json")).unwrap();
+        let hold = Hold::new(0.033, [0.1, 0.2]);
+        let mut rng = Pcg64Mcg::seed_from_u64(1);
+        let mut memory = network.nominal();
+        for _ in 0..1000 {
+            let mut draw = |low: f64, high: f64| rng.random_range(low..high);
+            let x = State::from([draw(3.0, 30.0), draw(-2.0, 2.0), draw(-1.0, 1.0), draw(-1.0, 1.0), draw(-0.8, 0.8)]);
+            let u = Input::from([draw(-0.7, 0.7), draw(-5.0, 4.0)]);
+            let stage = || Stage { network: &network, memory, x, u, hold: &hold };
+            let (narrow, wide) = (stage().run(), widest(stage()));
+            // Equality of the texts tells zeros by their signs too.
+            assert_eq!(format!("{narrow:?}"), format!("{wide:?}"));
+            memory = wide.0;
+        }
+    }
+}
