@@ -95,8 +95,7 @@ fn ceiling(runs: &[Run]) -> Vec<Verdict> {
                 (_, Wind::Felt) => " that feels the wind",
                 (_, Wind::Foreseen) => " that foresees the wind",
             };
-            let [ours, best] =
-                [Who::Ours, Who::Nonlinear(wind)].map(|who| find(runs, situation, who).figures.tracking);
+            let [ours, best] = [Who::Ours, Who::Nonlinear(wind)].map(|who| find(runs, situation, who).figures.tracking);
             for (name, share) in
                 [("lateral error", ours.e_y_rms / best.e_y_rms), ("speed error", ours.speed_rms / best.speed_rms)]
             {

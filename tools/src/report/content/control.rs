@@ -135,7 +135,9 @@ fn difference(runs: &[Run], situation: Situation) -> String {
         )
     });
     if situation == Situation::LaneChange {
-        return format!("{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}.\n");
+        return format!(
+            "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}.\n"
+        );
     }
     format!(
         "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt} when it feels the wind, as ours \

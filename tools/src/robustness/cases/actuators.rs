@@ -1,4 +1,4 @@
-//! Slow and late actuators on the lane change, known to the controller and known a little wrong; bad sensors.
+//! Slow and late actuators, known to the controller and known a little wrong; bad sensors.
 
 use super::{CM, Case, SEEDS, lateral};
 use crate::robustness::scenario::Scenario;
@@ -26,6 +26,17 @@ pub(super) fn cases() -> Vec<Case> {
                 .called(format!("seed {seed}"))
         })
         .into();
+    let late = |road: &str, more: &[(&str, f64)]| -> Vec<Scenario> {
+        [0.1, 0.15, 0.2, 0.25]
+            .into_iter()
+            .flat_map(|delay: f64| [-WRONG, 0.0, WRONG].map(|wrong| (delay, delay + wrong)))
+            .map(|(delay, assumed)| {
+                let name = format!("{:.0} ms, assumed {:.0}", 1e3 * delay, 1e3 * assumed);
+                Scenario::on(road).slowed(0.0, delay, assumed).with(more).called(name)
+            })
+            .collect()
+    };
+    let gust = [("plant.speed", 25.0), ("plant.gust_speed", 20.0)];
     let case =
         |name, asked, limit, scenarios| Case { name, asked, limit: Some(limit), unit: CM, scenarios, measure: lateral };
     vec![
@@ -38,6 +49,9 @@ pub(super) fn cases() -> Vec<Case> {
             0.04,
             vec![Scenario::lane_change(SPEED).slowed(0.3, 0.25, 0.25).called("told")],
         ),
+        // The car must not be lost: half a metre is what a lane leaves on either side.
+        case("fast_wrong", "general track to 25 m/s, delay 0.1 to 0.25 s, 20 ms wrong", 0.5, late("general", &[])),
+        case("fast_gust", "gust of 20 m/s at 25 m/s, delay 0.1 to 0.25 s, 20 ms wrong", 0.5, late("straight", &gust)),
         // No more than ten of the position sensor's deviations: the car must not be lost to what it does not know.
         case("bad_sensors", "sensor noise three times what is assumed, at 14 m/s", 0.3, bad_sensors),
     ]
