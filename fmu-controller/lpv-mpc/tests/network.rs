@@ -1,8 +1,8 @@
 //! The network that ships, held against the tyre's own formula and against what the controller needs of it.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+mod counting;
 
+use counting::allocations;
 use lpv_mpc::jordan::{Measured, Memory, Network};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -12,30 +12,6 @@ const L_F: f64 = 1.2;
 const L_R: f64 = 1.6;
 const M: f64 = 1575.0;
 const G: f64 = 9.81;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// Counts the allocations of the test's own thread.
-struct Counting;
-
-// SAFETY: every call goes to the system's allocator unchanged; counting touches no memory of its own.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn shipped() -> Network {
     Network::from_json(include_str!("../../resources/jordan.json")).expect("the shipped network is valid")
@@ -141,9 +117,6 @@ fn inference_allocates_nothing() {
     let network = shipped();
     let measured = motion(16.0, 0.05, 0.05, 0.0);
     let memory = network.nominal();
-    let before = ALLOCATIONS.with(Cell::get);
-    let next = network.step(&memory, &measured);
-    let (_, belief) = network.linearise(&next, &measured);
-    let after = ALLOCATIONS.with(Cell::get);
-    assert_eq!(after, before, "allocations for {belief:?}");
+    let (count, belief) = allocations(|| network.linearise(&network.step(&memory, &measured), &measured).1);
+    assert_eq!(count, 0, "allocations for {belief:?}");
 }
