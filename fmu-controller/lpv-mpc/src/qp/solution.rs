@@ -50,7 +50,7 @@ pub struct Solution<const NX: usize, const NU: usize> {
     pub lambda: Vec<SVector<f64, NX>>, // N
     /// What the answer is worth.
     pub outcome: Outcome,
-    /// Sweeps over the horizon, or iterations of an interior point method.
+    /// Sweeps over the horizon, single changes of the active set, iterations of an interior point method, together.
     pub iterations: u32,
     /// Optimality residual, scaled as [`super::optimality::residual`] says.
     pub residual: f64,

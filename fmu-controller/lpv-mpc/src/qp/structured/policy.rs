@@ -33,9 +33,7 @@ impl<const NX: usize, const NU: usize> Policy<NX, NU> {
 #[inline(always)]
 pub(super) fn invert<const NU: usize>(H: &[[f64; NU]; NU], hold: &[Hold; NU]) -> Option<[[f64; NU]; NU]> {
     let mut matrix = *H;
-    let mut inverse = [[0.0; NU]; NU];
     for j in 0..NU {
-        inverse[j][j] = 1.0;
         if !matches!(hold[j], Hold::Free) {
             for l in 0..NU {
                 matrix[l][j] = if l == j { 1.0 } else { 0.0 };
@@ -48,21 +46,19 @@ pub(super) fn invert<const NU: usize>(H: &[[f64; NU]; NU], hold: &[Hold; NU]) ->
             return None;
         }
         let scale = 1.0 / pivot;
+        matrix[j][j] = 1.0;
         for l in 0..NU {
             matrix[l][j] *= scale;
-            inverse[l][j] *= scale;
         }
-        for row in 0..NU {
-            if row != j {
-                let factor = matrix[j][row];
-                for l in 0..NU {
-                    matrix[l][row] -= factor * matrix[l][j];
-                    inverse[l][row] -= factor * inverse[l][j];
-                }
+        for row in (0..NU).filter(|row| *row != j) {
+            let factor = matrix[j][row];
+            matrix[j][row] = 0.0;
+            for l in 0..NU {
+                matrix[l][row] -= factor * matrix[l][j];
             }
         }
     }
-    Some(inverse)
+    Some(matrix)
 }
 
 /// Gains of the policy from the stationarity of the free inputs and the equations of the held ones.
@@ -86,9 +82,10 @@ pub(super) fn policy_gains<const NX: usize, const NU: usize>(
         }
     }
     for c in 0..NX {
-        policy.K[c] = [0.0; NU];
+        let mut column = [0.0; NU];
         for j in 0..NU {
-            axpy(factor.G[c][j], &from_state[j], &mut policy.K[c]);
+            axpy(factor.G[c][j], &from_state[j], &mut column);
         }
+        policy.K[c] = column;
     }
 }

@@ -38,6 +38,17 @@ impl<const NX: usize, const NU: usize> Value<NX, NU> {
     pub(super) const ZERO: Self =
         Self { S: [[0.0; NX]; NX], T: [[0.0; NU]; NX], U: [[0.0; NU]; NU], s: [0.0; NX], t: [0.0; NU] };
 
+    /// Adds `weights_k (x_k - targets_k)^2` of all states.
+    #[inline(always)]
+    pub(super) fn add_squares(&mut self, weights: &[f64; NX], targets: &[f64; NX]) {
+        for k in 0..NX {
+            self.S[k][k] += weights[k];
+        }
+        for k in 0..NX {
+            self.s[k] -= weights[k] * targets[k];
+        }
+    }
+
     /// Adds `weight (x_k - target)^2`.
     #[inline(always)]
     pub(super) fn add_square(&mut self, k: usize, weight: f64, target: f64) {
@@ -60,7 +71,7 @@ pub(super) fn axpy<const M: usize>(a: f64, x: &[f64; M], y: &mut [f64; M]) {
 }
 
 #[inline(always)]
-fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C]) -> [[f64; C]; R] {
+pub(super) fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C]) -> [[f64; C]; R] {
     let mut rows = [[0.0; C]; R];
     for c in 0..C {
         for r in 0..R {
@@ -70,7 +81,9 @@ fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C]) -> [[f64; 
     rows
 }
 
-/// Minimises over the input of a stage: from the value of what follows to the policy and the value in front.
+/// Minimises over the input of a stage: from the value of what follows to the policy and the value in front. `before` comes in
+/// with what the state in front costs by itself: written before the step instead of after it, because the next step reads whole
+/// rows, and would wait for single elements written just before.
 /// The affine term of the prediction is `d` instead of the stage's own, for recursions over differences.
 ///
 /// An input that is held at a bound keeps the form of the policy: a constant, or the previous input plus a constant.
@@ -98,24 +111,33 @@ pub(super) fn step<const NX: usize, const NU: usize>(
         for l in 0..NX {
             axpy(after.S[k][l], &B_rows[l], &mut M[k]);
         }
-        axpy(d[k], &after.S[k], &mut Sd);
-        axpy(d[k], &after.T[k], &mut Td);
+        // Differences have no affine term, nor have models without wind.
+        if d[k] != 0.0 {
+            axpy(d[k], &after.S[k], &mut Sd);
+            axpy(d[k], &after.T[k], &mut Td);
+        }
     }
-    // G = M' A by columns, H = B' M + T' B + U + R.
+    // G = M' A by columns.
     let mut G = [[0.0; NU]; NX];
     for c in 0..NX {
         for k in 0..NX {
             axpy(A[c][k], &M[k], &mut G[c]);
         }
     }
-    let mut H = after.U;
+    // H = B' S B + B' T + T' B + U + R, the symmetric part of B' (M + T) + U + R.
+    let mut BM = [[0.0; NU]; NU];
     for k in 0..NX {
+        let mut MT = M[k];
+        axpy(1.0, &after.T[k], &mut MT);
         for j in 0..NU {
-            axpy(B[j][k], &M[k], &mut H[j]);
-            axpy(after.T[k][j], &B_rows[k], &mut H[j]);
+            axpy(B[j][k], &MT, &mut BM[j]);
         }
     }
+    let mut H = after.U;
     for j in 0..NU {
+        for l in 0..NU {
+            H[j][l] += 0.5 * (BM[j][l] + BM[l][j]);
+        }
         H[j][j] += r[j];
     }
     let inverse = invert(&H, hold)?;
@@ -123,7 +145,7 @@ pub(super) fn step<const NX: usize, const NU: usize>(
     policy_gains(&factor, r, hold, policy);
     linear_step(stage, &factor, r, hold, (&after.s, &after.t), policy, (&mut before.s, &mut before.t));
 
-    // S = A' S A + G' K, T = G' L: the terms of inputs that are free cancel to these by optimality.
+    // S = Q + A' S A + G' K, T = G' L: the terms of inputs that are free cancel to these by optimality.
     let G_rows = transpose(&G);
     for c in 0..NX {
         let mut SA = [0.0; NX];
@@ -133,28 +155,35 @@ pub(super) fn step<const NX: usize, const NU: usize>(
                 axpy(A[c][k], &after.S[k], &mut SA);
             }
         }
-        let mut column = [0.0; NX];
+        let mut column = before.S[c];
         for k in 0..NX {
             axpy(SA[k], &A_rows[k], &mut column);
         }
         for j in 0..NU {
             axpy(policy.K[c][j], &G_rows[j], &mut column);
         }
+        // Rounding must not break the symmetry that the next stage relies on.
+        for k in 0..c {
+            column[k] = before.S[k][c];
+        }
         before.S[c] = column;
     }
-    // Rounding must not break the symmetry that the next stage relies on.
-    for c in 0..NX {
-        for k in 0..c {
-            before.S[k][c] = before.S[c][k];
+    if hold.iter().all(|hold| matches!(hold, Hold::Free)) {
+        // T = G' H^-1 R = -K' R.
+        for k in 0..NX {
+            for j in 0..NU {
+                before.T[k][j] = -r[j] * policy.K[k][j];
+            }
         }
-    }
-    let L_rows = transpose(&policy.L);
-    for k in 0..NX {
-        let mut row = [0.0; NU];
-        for j in 0..NU {
-            axpy(G[k][j], &L_rows[j], &mut row);
+    } else {
+        let L_rows = transpose(&policy.L);
+        for k in 0..NX {
+            let mut row = [0.0; NU];
+            for j in 0..NU {
+                axpy(G[k][j], &L_rows[j], &mut row);
+            }
+            before.T[k] = row;
         }
-        before.T[k] = row;
     }
     for j in 0..NU {
         for p in 0..NU {
@@ -177,7 +206,8 @@ pub(super) fn step<const NX: usize, const NU: usize>(
     Some(factor)
 }
 
-/// The part of [`step`] that is linear in the affine terms: constant of the policy, slopes of the value in front.
+/// The part of [`step`] that is linear in the affine terms: constant of the policy, slopes of the value in front, which come in
+/// with those of the state in front by itself.
 #[inline(always)]
 pub(super) fn linear_step<const NX: usize, const NU: usize>(
     stage: &Stage<NX, NU>,
@@ -209,7 +239,6 @@ pub(super) fn linear_step<const NX: usize, const NU: usize>(
         };
         axpy(constant, &factor.inverse[j], &mut policy.k);
     }
-    *s_before = [0.0; NX];
     for k in 0..NX {
         axpy(y[k], &A_rows[k], s_before);
     }

@@ -30,7 +30,18 @@ pub(super) fn advance<const NX: usize, const NU: usize>(
     x: &[f64; NX],
     u: &[f64; NU],
 ) -> [f64; NX] {
-    let mut next = stage.d.data.0[0];
+    advance_from(stage.d.data.0[0], stage, x, u)
+}
+
+/// Next state with another affine term, as differences have it.
+#[inline(always)]
+pub(super) fn advance_from<const NX: usize, const NU: usize>(
+    d: [f64; NX],
+    stage: &Stage<NX, NU>,
+    x: &[f64; NX],
+    u: &[f64; NU],
+) -> [f64; NX] {
+    let mut next = d;
     for k in 0..NX {
         axpy(x[k], &stage.A.data.0[k], &mut next);
     }

@@ -23,16 +23,12 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         let r = &problem.r.data.0[0];
         let (mut value, mut before) = (terminal(problem), Value::ZERO);
         let (mut value, mut before) = (&mut value, &mut before);
+        self.add_costs(problem, N, value);
         let mut demand = [None; NU];
         for i in (0..N).rev() {
-            if i + 1 < N {
-                for k in 0..NX {
-                    value.add_square(k, problem.q[k], problem.stages[i].x_ref[k]);
-                }
-            }
-            if self.sides[i] != 0 {
-                value.add_square(problem.soft_state, problem.soft, f64::from(self.sides[i]) * problem.soft_bound);
-            }
+            before.S = [[0.0; NX]; NX];
+            before.s = [0.0; NX];
+            self.add_costs(problem, i, before);
             let mut hold = [Hold::Free; NU];
             for j in 0..NU {
                 (hold[j], demand[j]) = active::hold(problem, j, self.active[i][j], demand[j]);
@@ -44,6 +40,21 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             mem::swap(&mut value, &mut before);
         }
         true
+    }
+
+    /// Adds what state `i` costs by itself, but for the last one's weight, which [`terminal`] has.
+    #[inline(always)]
+    fn add_costs(&self, problem: &Problem<NX, NU>, i: usize, value: &mut Value<NX, NU>) {
+        if i == 0 {
+            return;
+        }
+        if i < self.horizon {
+            value.add_squares(&problem.q.data.0[0], &problem.stages[i - 1].x_ref.data.0[0]);
+        }
+        let side = self.sides[i - 1];
+        if side != 0 {
+            value.add_square(problem.soft_state, problem.soft, f64::from(side) * problem.soft_bound);
+        }
     }
 
     /// Sets costates, multipliers and residual of the plan, and leaves the bounds whose multipliers have the wrong sign.

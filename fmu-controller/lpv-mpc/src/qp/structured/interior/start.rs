@@ -5,15 +5,19 @@ use super::super::{Problem, Solution};
 use super::{Interior, Row, Rows};
 use nalgebra::SVector;
 
+/// Distance to a bound, as a fraction of what is possible there, below which no input starts.
+const MARGIN: f64 = 0.15;
+/// Part of the complementarity that would balance the gradient at which the method starts.
+const BALANCE: f64 = 0.03;
+
 impl<const NX: usize, const NU: usize> Interior<NX, NU> {
-    /// Moves a plan into the interior of the bounds, so that no distance is below `margin` of what is possible there.
+    /// Moves a plan into the interior of the bounds, so that no distance is below [`MARGIN`] of what is possible there.
     pub(super) fn start(
         &mut self,
         problem: &Problem<NX, NU>,
         plan: &[[f64; NU]],
         solution: &mut Solution<NX, NU>,
     ) -> f64 {
-        const MARGIN: f64 = 0.05;
         let N = plan.len();
         let mut p = problem.u_prev_clamped();
         let mut x = problem.x_0;
@@ -43,7 +47,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 mu += (gradient[j].abs() + 1e-3 * scale[j]) * optimality::span(problem, j);
             }
         }
-        mu = 0.1 * mu / (N * NU) as f64;
+        mu = BALANCE * mu / (N * NU) as f64;
         let k = problem.soft_state;
         for i in 0..N {
             for j in 0..NU {

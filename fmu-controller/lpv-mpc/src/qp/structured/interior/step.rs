@@ -2,7 +2,8 @@
 
 use super::super::Problem;
 use super::super::active::Hold;
-use super::super::riccati::{self, Value, axpy};
+use super::super::riccati::{self, Value};
+use super::super::rollout;
 use super::{Interior, Row};
 use nalgebra::SVector;
 
@@ -41,27 +42,8 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
     pub(super) fn recursion(&mut self, problem: &Problem<NX, NU>, factorise: bool) -> bool {
         let N = self.u.len();
         let u_prev = problem.u_prev_clamped();
-        let mut value = Value::<NX, NU>::ZERO;
-        let has_soft_bound = problem.has_soft_bound();
-        let soft_state = problem.soft_state;
+        let mut value = self.costs(problem, N);
         for i in (0..N).rev() {
-            let error = SVector::from(self.x[i]) - problem.stages[i].x_ref;
-            if i + 1 < N {
-                for k in 0..NX {
-                    value.S[k][k] += problem.q[k];
-                    value.s[k] += problem.q[k] * error[k];
-                }
-            } else {
-                value.S = problem.q_terminal.data.0;
-                value.s = (problem.q_terminal * error).data.0[0];
-            }
-            if has_soft_bound {
-                for (row, sign) in self.soft[i].iter().zip([1.0, -1.0]) {
-                    let denominator = row.s + row.z / (2.0 * problem.soft);
-                    value.S[soft_state][soft_state] += 0.5 * row.z / denominator;
-                    value.s[soft_state] += sign * 0.5 * (row.z + (row.target - row.s * row.z) / denominator);
-                }
-            }
             let mut r = problem.r.data.0[0];
             let mut hold = [Hold::Free; NU];
             let mut slope = [0.0; NU];
@@ -72,11 +54,13 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 }
                 let p = if i == 0 { u_prev[j] } else { self.u[i - 1][j] };
                 slope[j] = r[j] * (self.u[i][j] - p);
-                for (m, row) in self.rows[i][j].iter().enumerate() {
+                for (m, row) in self.rows[i][j].iter_mut().enumerate() {
                     if row.z > 0.0 {
-                        let inverse = 1.0 / row.s;
-                        let weight = 0.5 * row.z * inverse;
-                        let push = -0.5 * SIGN[m] * row.target * inverse;
+                        if factorise {
+                            row.inverse = 1.0 / row.s;
+                        }
+                        let weight = 0.5 * row.z * row.inverse;
+                        let push = -0.5 * SIGN[m] * row.target * row.inverse;
                         if m < 2 {
                             value.U[j][j] += weight;
                             value.t[j] += push;
@@ -89,8 +73,8 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 value.t[j] += slope[j];
             }
             let stage = &problem.stages[i];
+            let mut before = self.costs(problem, i);
             let policy = &mut self.policies[i];
-            let mut before = Value::ZERO;
             if factorise {
                 match riccati::step(stage, &[0.0; NX], &value, &r, &hold, policy, &mut before) {
                     Some(factor) => self.factors[i] = factor,
@@ -109,26 +93,52 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         let mut p = [0.0; NU];
         for i in 0..N {
             p = self.policies[i].input(&x, &p);
-            let stage = &problem.stages[i];
-            let mut next = [0.0; NX];
-            for k in 0..NX {
-                axpy(x[k], &stage.A.data.0[k], &mut next);
-            }
-            for j in 0..NU {
-                axpy(p[j], &stage.B.data.0[j], &mut next);
-            }
-            x = next;
+            x = rollout::advance_from([0.0; NX], &problem.stages[i], &x, &p);
             self.du[i] = p;
             self.dx[i] = x;
         }
         true
     }
 
+    /// What state `i` costs by itself near the iterate, with the barrier of the soft bound.
+    #[inline(always)]
+    fn costs(&self, problem: &Problem<NX, NU>, i: usize) -> Value<NX, NU> {
+        let mut value = Value::ZERO;
+        if i == 0 {
+            return value;
+        }
+        let error = SVector::from(self.x[i - 1]) - problem.stages[i - 1].x_ref;
+        if i == self.u.len() {
+            value.S = problem.q_terminal.data.0;
+            value.s = (problem.q_terminal * error).data.0[0];
+        } else {
+            for k in 0..NX {
+                value.S[k][k] = problem.q[k];
+                value.s[k] = problem.q[k] * error[k];
+            }
+        }
+        if problem.has_soft_bound() {
+            let k = problem.soft_state;
+            for (row, sign) in self.soft[i - 1].iter().zip([1.0, -1.0]) {
+                let denominator = row.s + row.z / (2.0 * problem.soft);
+                value.S[k][k] += 0.5 * row.z / denominator;
+                value.s[k] += sign * 0.5 * (row.z + (row.target - row.s * row.z) / denominator);
+            }
+        }
+        value
+    }
+
     /// Directions of distances and multipliers; returns the step length that keeps all of them positive.
     pub(super) fn directions(&mut self, problem: &Problem<NX, NU>, fraction: f64) -> f64 {
         let mut inverse_alpha: f64 = fraction;
         let mut limit = |row: &Row| {
-            inverse_alpha = inverse_alpha.max(-row.ds / row.s).max(-row.dz / row.z);
+            // Divisions only where a row sets the limit, which few do.
+            if -row.ds > inverse_alpha * row.s {
+                inverse_alpha = -row.ds / row.s;
+            }
+            if -row.dz > inverse_alpha * row.z {
+                inverse_alpha = -row.dz / row.z;
+            }
         };
         let mut dp = [0.0; NU];
         for i in 0..self.u.len() {
@@ -137,7 +147,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 for (m, row) in self.rows[i][j].iter_mut().enumerate() {
                     if row.z > 0.0 {
                         row.ds = SIGN[m] * if m < 2 { du } else { du - dp[j] };
-                        row.dz = (row.target - row.z * row.ds) / row.s - row.z;
+                        row.dz = (row.target - row.z * row.ds) * row.inverse - row.z;
                         limit(row);
                     }
                 }
