@@ -27,7 +27,7 @@ const STATUS: Enumeration = Enumeration {
         Item {
             value: Status::Estimated as i32,
             name: "estimated",
-            description: "The plan is optimal, but a measurement was missing or not finite and its estimate was used",
+            description: "The plan is optimal, but a measurement was missing, not finite or not believed, and its estimate was used",
         },
         Item {
             value: Status::PreviousPlan as i32,

@@ -11,6 +11,7 @@ use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
+use crate::lanes::{Work, widest};
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
 use crate::modes::{Adaptation, Estimation};
@@ -48,6 +49,23 @@ struct Beliefs {
     tyres: Adapter,
     /// Period and lags of the prediction model.
     hold: Hold,
+}
+
+/// [`Controller::sample`] with its arguments.
+struct Sampling<'a> {
+    controller: &'a mut Controller,
+    t: f64,
+    h: f64,
+    inputs: &'a Inputs,
+}
+
+impl Work for Sampling<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.controller.sample(self.t, self.h, self.inputs);
+    }
 }
 
 /// Adaptive LPV-MPC of steering and speed.
@@ -195,13 +213,14 @@ impl Controller {
             self.samples += 1;
             self.sampled += 1;
             let (age, inputs) = measure((due - t).max(0.0));
-            self.sample(t + age, h - age, &inputs);
+            widest(Sampling { controller: self, t: t + age, h: h - age, inputs: &inputs });
             self.latency.send(t + h, self.u_prev);
         }
     }
 
     /// One sample with what was measured at `t` [s], whose command is visible after `h` [s]: estimate, predict over the
     /// latency, plan, take the first command.
+    #[inline(always)]
     fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
         let (duration, delivered) = self.latency.advance(t);
         self.snapshot.inputs.clone_from(inputs);
@@ -256,7 +275,8 @@ impl Controller {
         ))
     }
 
-    /// State and unexplained accelerations at the measurement, and whether all of it was measured.
+    /// State and unexplained accelerations at the measurement, and whether all of it was measured and believed.
+    #[inline(always)]
     fn estimate(&mut self, inputs: &Inputs, duration: f64, delivered: &Input) -> (State, Trend, bool) {
         let mut measured = inputs.state();
         if self.parameters.estimation == Estimation::Measured {
@@ -273,9 +293,10 @@ impl Controller {
             // Some importers show zeros until the first exchange of values: a plan for a car at rest serves no moving one.
             with_mpc!(&mut self.core, mpc => mpc.forget());
         }
-        (self.estimator.x, self.estimator.trend, complete)
+        (self.estimator.x, self.estimator.trend, complete && !self.estimator.doubts())
     }
 
+    #[inline(always)]
     fn publish(&mut self, status: Status) {
         let Self { output, .. } = self;
         output.delta = self.u_prev[DELTA];

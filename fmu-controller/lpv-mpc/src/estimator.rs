@@ -94,6 +94,7 @@ impl<T: Scalar> Estimator<T> {
     ///
     /// `measured` may hold NaN where nothing was measured, `kappa` is the curvature at the measurement [1/m]. Returns whether
     /// the filter had to start again, because no car gets from its estimate to that speed.
+    #[inline(always)]
     pub fn update(
         &mut self,
         measured: &State<T>,
@@ -148,6 +149,11 @@ impl<T: Scalar> Estimator<T> {
         }
     }
 
+    /// Whether a measurement was left out in the last update because no car in the estimated state would show it.
+    pub fn doubts(&self) -> bool {
+        self.left_out.contains(&true)
+    }
+
     /// Whether there is an estimate at all.
     pub fn is_started(&self) -> bool {
         self.started
@@ -177,6 +183,7 @@ impl<T: Scalar> Estimator<T> {
         (SENSOR_DEVIATION[i] * self.sensor_noise).powi(2)
     }
 
+    #[inline(always)]
     fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres<T>) {
         let hold = Hold::new(duration, [0.0, 0.0]);
         let input = input.map(T::from);
@@ -214,6 +221,7 @@ impl<T: Scalar> Estimator<T> {
     }
 
     /// One measured state; the covariance stays symmetric because its column and row are the same numbers.
+    #[inline(always)]
     fn correct(&mut self, i: usize, z: T) {
         if !self.started {
             return;
@@ -237,6 +245,7 @@ impl<T: Scalar> Estimator<T> {
 ///
 /// An acceleration held over the step adds up to first order in the velocities and to second order in the errors on the
 /// path; it is a random walk, so more would pretend to know it better.
+#[inline(always)]
 fn move_column<T: Scalar>(x: &State<T>, d: &SVector<T, 3>, Phi: &SMatrix<T, NX, NX>, duration: f64) -> State<T> {
     let mut moved = Phi * x;
     for j in 0..3 {

@@ -24,7 +24,7 @@ pub enum Status {
     /// The plan is optimal to the tolerance of Clarabel: it is the chosen solver, or the structured one found no plan, and the
     /// answer took some hundred times as long.
     SecondSolver,
-    /// The plan is optimal, but some measurement was missing or not finite and its estimate was used instead.
+    /// The plan is optimal, but some measurement was missing, not finite or unbelievable, and its estimate was used instead.
     Estimated,
     /// No new plan; the previous one is executed further.
     PreviousPlan,
@@ -38,7 +38,7 @@ impl fmt::Display for Status {
             Self::Optimal => "optimal",
             Self::InteriorPoint => "optimal to the tolerance of an interior point method",
             Self::SecondSolver => "optimal to the tolerance of the second solver",
-            Self::Estimated => "optimal for an estimate, a measurement is missing",
+            Self::Estimated => "optimal for an estimate, a measurement is missing or not believed",
             Self::PreviousPlan => "the previous plan is executed further",
             Self::SafeStop => "safe stop, steering held",
         })
