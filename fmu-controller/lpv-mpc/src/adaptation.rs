@@ -85,6 +85,7 @@ impl Adapter {
     }
 
     /// Takes in one sample: the state, what the actuators deliver, and the friction of the road [1].
+    #[inline(always)]
     pub fn observe(&mut self, x: &State, u: &Input, mu: f64) {
         if self.mode == Adaptation::Constant {
             return;

@@ -121,6 +121,7 @@ impl<T: Scalar> Place<T> {
 /// In a curve the lateral acceleration takes it, before a curve the braking; where both are needed they share the circle of
 /// friction. Passed from the end of the preview to its beginning, as for the speed profile of a racing line. Where every
 /// place could be driven at the fastest wanted speed, nothing is limited, and nothing is passed.
+#[inline(always)]
 fn permitted<T: Scalar>(s: &Row<T>, kappa: &Row<T>, v_x: &Row<T>, mu: &Row<T>, p: &Parameters) -> Row<T> {
     let mut limit = [T::from(NO_LIMIT); PREVIEW];
     // A comparison is one instruction, unlike `max`, and these chains are long.

@@ -181,7 +181,7 @@ impl<T: Scalar> Columns<T> {
 }
 
 /// Discretises the system over a hold, the actuators being ideal.
-#[inline]
+#[inline(always)]
 pub fn discretise<T: Scalar>(lpv: &Lpv<T>, hold: &Hold) -> Discrete<T> {
     let mut sample = Discrete::zeros();
     let Discrete { Phi, Gamma, d } = &mut sample;

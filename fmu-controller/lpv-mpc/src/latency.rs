@@ -108,6 +108,7 @@ impl Latency {
     /// Moves the state `x` at the time of the last [`advance`](Self::advance) on by `step` [s] and the delay.
     ///
     /// `kappa` gives the curvature [1/m] at a distance from the place of the measurement [m].
+    #[inline(always)]
     pub fn predict<T: Scalar>(
         &self,
         x: &State<T>,
@@ -142,6 +143,7 @@ impl Latency {
     }
 
     /// One classic Runge-Kutta step of state and distance, `(x', s') = f(x, u, s)`, behind the lags.
+    #[inline(always)]
     fn runge_kutta<T: Scalar>(
         &self,
         at: &Predicted<T>,

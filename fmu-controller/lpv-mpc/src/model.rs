@@ -206,7 +206,7 @@ pub fn motion<T: Scalar>(
 /// Exact: `A x + B u + d` at the scheduling point equals [`derivative`]. Differs from the printed matrices in the signs of
 /// `A52`, `B21`, `B31` and of the rear term in `A32`, in the misplaced cosines of `A32` and `A33`, and in the lateral
 /// error's row: the printed `A41 = sin e_psi` with `A45 = 0` makes (A, B) uncontrollable, `A45 = v_x sinc e_psi` does not.
-#[inline]
+#[inline(always)]
 pub fn embed<T: Scalar>(
     x: &State<T>,
     u: &Input<T>,

@@ -85,6 +85,7 @@ impl Inputs {
     }
 
     /// The previewed road.
+    #[inline(always)]
     pub(crate) fn road(&self, p: &Parameters) -> Road {
         Road::new(self.rows(), p)
     }
