@@ -7,14 +7,17 @@
 //!
 //! Where the network is not believed, or there is none for this car, the nominal tyres take over, and their force ends at what
 //! friction gives ([`Grip`]): a plan from far off the path, made with tyres that hold any slip, spins the car.
+//!
+//! On top of both comes what the car shows of its tyres and its road ([`Friction`]): nobody tells a controller each of them.
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
+use crate::friction::{Friction, Given};
 use crate::grip::{Grip, TANGENT_FLOOR};
 use crate::jordan::{Belief, Document, Measured, Memory, Network};
-use crate::model::{A_X, DELTA, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE};
 use crate::modes::Adaptation;
 use crate::mpc::TyreModel;
 
@@ -45,6 +48,7 @@ pub struct Adapter {
     mode: Adaptation,
     nominal: Tyres,
     grip: Grip,
+    friction: Friction,
     network: Option<Network>,
     /// The network's last answer, one sample ago.
     memory: Memory,
@@ -66,6 +70,7 @@ impl Adapter {
             mode: p.adaptation,
             nominal,
             grip: Grip::new(p),
+            friction: Friction::new(),
             network,
             memory,
             rolled: memory,
@@ -77,6 +82,10 @@ impl Adapter {
     /// Takes over nominal tyres and friction, which may change between samples.
     pub fn tune(&mut self, p: &Parameters) {
         let nominal = p.nominal_tyres();
+        if nominal != self.nominal || p.mu != self.grip.friction() {
+            // What was found was found beside other beliefs.
+            self.friction = Friction::new();
+        }
         (self.nominal, self.grip) = (nominal, Grip::new(p));
         if self.mode == Adaptation::Constant {
             self.present = nominal;
@@ -97,19 +106,42 @@ impl Adapter {
         self.believed = (secant.c_f, secant.c_r, confidence);
     }
 
+    /// Learns from what was unexplained at the last sample, whose state and input are given, what the tyres have over their
+    /// belief, and leaves of it what that does not explain. `duration` is the time since then [s].
+    pub fn learn(&mut self, x: &State, u: &Input, unexplained: &mut Disturbance, duration: f64, body: &Body) {
+        if self.mode == Adaptation::Constant || x[V_X] < V_GUARD || duration <= 0.0 {
+            return;
+        }
+        let given = Given::by(&self.present, x, u, body);
+        let besides = unexplained.fixed_rows::<2>(V_Y).into_owned();
+        if !(given.slope + given.offset + besides).iter().all(|a| a.is_finite()) {
+            return;
+        }
+        let before = self.friction.factors();
+        let rest = besides - self.friction.learn(&given, &besides, duration);
+        unexplained.fixed_rows_mut::<2>(V_Y).copy_from(&rest);
+        self.present = self.friction.factors().over(&before).apply(&self.present);
+    }
+
     /// The next memory, secants, tangents and confidence at a state and input.
     #[inline(always)]
     fn answer(&self, memory: &Memory, x: &State, u: &Input, mu: f64) -> (Memory, Tyres, Tyres, f64) {
-        let Some((memory, belief)) = self.ask(memory, x, u) else {
-            let (secant, tangent) = self.grip.tyres(&self.nominal, x, u, mu);
+        let found = self.friction.factors();
+        let slip = found.slip();
+        let nominal = || self.grip.tyres(&scaled(&self.nominal, slip), x, u, mu * found.grip);
+        // The same car, slipping as much as the believed tyre has to for its share of the force.
+        let x_0 = State::from([x[V_X], x[V_Y] * slip, x[YAW_RATE] * slip, x[E_Y], x[E_PSI]]);
+        let Some((memory, belief)) = self.ask(memory, &x_0, &Input::from([u[DELTA] * slip, u[A_X]])) else {
+            let (secant, tangent) = nominal();
             return (*memory, secant, tangent, 0.0);
         };
         let share = self.share(mu);
-        let (secant, tangent) = (scaled(&belief.secant(), share), scaled(&belief.tangent(TANGENT_FLOOR), share));
+        let [secant, tangent] =
+            [belief.secant(), belief.tangent(TANGENT_FLOOR)].map(|tyres| found.apply(&scaled(&tyres, share)));
         if belief.confidence == 1.0 {
             return (memory, secant, tangent, 1.0);
         }
-        let (nominal_secant, nominal_tangent) = self.grip.tyres(&self.nominal, x, u, mu);
+        let (nominal_secant, nominal_tangent) = nominal();
         let blend = |believed, nominal| blend(&believed, &nominal, belief.confidence);
         (memory, blend(secant, nominal_secant), blend(tangent, nominal_tangent), belief.confidence)
     }
@@ -263,7 +295,6 @@ impl TyreModel for Adapter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Disturbance;
 
     #[test]
     fn the_network_of_another_car_leaves_nominal_tyres_that_know_their_grip() {

@@ -223,6 +223,10 @@ impl Controller {
     #[inline(always)]
     fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
         let (duration, delivered) = self.latency.advance(t);
+        if self.parameters.estimation == Estimation::Kalman {
+            let Self { beliefs: Beliefs { body, tyres, .. }, estimator, snapshot, .. } = self;
+            tyres.learn(&estimator.x, &snapshot.delivered, &mut estimator.trend.now, duration, body);
+        }
         self.snapshot.inputs.clone_from(inputs);
         self.snapshot.estimator.clone_from(&self.estimator);
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);

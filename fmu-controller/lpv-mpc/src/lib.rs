@@ -16,6 +16,8 @@
 //!   comment says so.
 //! - \[Chu\] E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, "Structure-preserving algorithms for periodic discrete-time
 //!   algebraic Riccati equations", International Journal of Control 77 (2004).
+//! - \[Pacejka\] H. B. Pacejka, "Tire and Vehicle Dynamics", 3rd ed., Butterworth-Heinemann 2012: the similarity method, section
+//!   4.2.
 //! - \[Rajamani\] R. Rajamani, "Vehicle Dynamics and Control", 2nd ed., Springer 2012: steady-state cornering, section 3.3.
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
@@ -28,6 +30,7 @@ pub mod controller;
 pub mod discretise;
 mod error;
 pub mod estimator;
+mod friction;
 mod grip;
 mod guide;
 mod horizon;

@@ -1,0 +1,289 @@
+//! How stiff the tyres are and how much grip there is, told from how the car answers.
+//!
+//! What the filter cannot explain ([`crate::estimator`]) holds wind and wrongly believed tyres alike. Their course tells them
+//! apart: wind pushes whatever the tyres do, while wrong tyres are missing in proportion to their own forces and turn round
+//! with them. A Kalman filter explains the accelerations by four random walks: wind on the lateral velocity and on the yaw
+//! rate, a factor on the stiffness of all tyres, and one on their grip.
+//!
+//! The factors are those of the similarity method, [Pacejka, section 4.2]: `F = g F_0(k alpha / g)` keeps the form of the
+//! believed tyre `F_0`, has `k` times its slope at small slip and ends at `g` times its force. Its derivatives are
+//! the two parts of the tangent model `F = C alpha + F_offset` of the prediction: along `k` the part with the slope, along `g` the
+//! offset. So at small slip a car shows how stiff its tyres are, near their peak how much grip there is; in
+//! between each follows the other in part, because a slippery road takes both.
+
+use nalgebra::{Matrix4, Vector2, Vector4};
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Body, Disturbance, Input, State, Tyres, V_X, V_Y, YAW_RATE, derivative};
+
+/// Smallest and largest factor on the stiffness [1].
+///
+/// A tyre of half the believed stiffness, and friction of 0.4 where 0.82 is believed, lie at the lower end. With 0.4 the lane change
+/// at 13.8 m/s on the `linear` tyre, untold, grows from 2.3 to 3.2 cm.
+const STIFFNESS: [f64; 2] = [0.5, 1.5];
+
+/// Smallest and largest factor on the grip [1].
+///
+/// Friction of 1 where 0.82 is believed is 1.22. A soft tyre must not be taken for a road on which nothing holds: with 0.7 and 1.3
+/// the same lane change grows from 1.9 to 2.3 cm, and that at friction 0.4 and 11.4 m/s from 0.5 to 0.7 cm.
+const GRIP: [f64; 2] = [0.8, 1.25];
+
+/// Standard deviations before anything is known, of wind [m/s2, rad/s2] as the estimator takes it, and of the factors [1]: those of
+/// friction between 0.4 and 1.
+const INITIAL: [f64; 4] = [1.0, 0.5, 0.3, 0.3];
+
+/// Intensities of the random walks [m/s2, rad/s2, 1, 1 per root second]: gusts of the general track, and roads that change within
+/// seconds. Half and twice the wind's change nothing by more than a twentieth.
+const WALK: [f64; 4] = [0.5, 0.25, 0.1, 0.1];
+
+/// How far stiffness and grip go together [1]: a road changes both alike, another tyre each in its own way. With 0.4 the lane change
+/// at friction 1 and 15.2 m/s is 0.3 mm worse, with 0.9 that at friction 0.4 and 12 m/s leaves the road where the patch is not seen.
+const TOGETHER: f64 = 0.7;
+
+/// Standard deviations of the unexplained accelerations [m/s2, rad/s2]: twice what the estimator's own covariance settles to
+/// under one unit of sensor noise, because its errors last for two samples. Half and twice that change nothing by more than 0.2 mm.
+const DEVIATION: [f64; 2] = [1.5, 0.3];
+
+/// Time by which a force may be off [s]: while the tyres' accelerations change, this times their rate adds to [`DEVIATION`].
+///
+/// A delay that is assumed wrong by a sample, or ice that begins under the car, shows as an acceleration that looks like wrong
+/// tyres. Without this the lane change at 17 m/s grows from 1.9 to 3.6 cm; with 0.3 s the delay that is 20 ms wrong costs 1.35 cm
+/// instead of 1.3, with 1 s the friction is learnt later.
+const LATE: f64 = 0.5;
+
+/// Time over which a change of the forces is remembered [s]: the estimator takes that long to settle after it.
+const MEMORY: f64 = 0.2;
+
+/// Indices of the factors' excess over 1; before them stands the wind.
+const K: usize = 2;
+const G: usize = 3;
+
+/// What the tyres have over what is believed of them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Factors {
+    /// On the slope at small slip [1].
+    pub stiffness: f64,
+    /// On the largest force [1].
+    pub grip: f64,
+}
+
+impl Factors {
+    /// The slip at which the believed tyre is asked, over the true one [1].
+    pub fn slip(&self) -> f64 {
+        self.stiffness / self.grip
+    }
+
+    /// The line through the force at the true slip, from that of the believed tyre at the slip it is asked at.
+    pub fn apply(&self, believed: &Tyres) -> Tyres {
+        let Self { stiffness, grip } = *self;
+        let Tyres { c_f, c_r, f_f0, f_r0 } = *believed;
+        Tyres { c_f: c_f * stiffness, c_r: c_r * stiffness, f_f0: f_f0 * grip, f_r0: f_r0 * grip }
+    }
+
+    /// These over others.
+    pub fn over(&self, others: &Self) -> Self {
+        Self { stiffness: self.stiffness / others.stiffness, grip: self.grip / others.grip }
+    }
+}
+
+/// What the tyres give, as accelerations on the lateral velocity [m/s2] and on the yaw rate [rad/s2].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Given {
+    /// By their slope.
+    pub slope: Vector2<f64>,
+    /// By their force at zero slip of the affine model.
+    pub offset: Vector2<f64>,
+}
+
+impl Given {
+    /// By these tyres at a state and input.
+    pub fn by(tyres: &Tyres, x: &State, u: &Input, body: &Body) -> Self {
+        let accelerations = |tyres: &Tyres| {
+            let rates = derivative(x, u, 0.0, body, tyres, &Disturbance::zeros());
+            // Turning with the body is no force.
+            Vector2::new(rates[V_Y] + x[YAW_RATE] * x[V_X], rates[YAW_RATE])
+        };
+        Self {
+            slope: accelerations(&Tyres::secant(tyres.c_f, tyres.c_r)),
+            offset: accelerations(&Tyres { c_f: 0.0, c_r: 0.0, ..*tyres }),
+        }
+    }
+}
+
+/// The filter of wind and factors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Friction {
+    estimate: Vector4<f64>,
+    P: Matrix4<f64>,
+    /// What the tyres gave at the last sample [m/s2, rad/s2], and how fast that changed lately [m/s3, rad/s3].
+    given: Vector2<f64>,
+    rate: Vector2<f64>,
+}
+
+impl Friction {
+    /// Tyres and road as they are believed.
+    pub fn new() -> Self {
+        let (given, rate) = (Vector2::zeros(), Vector2::zeros());
+        Self { estimate: Vector4::zeros(), P: covariance(INITIAL), given, rate }
+    }
+
+    /// What is found so far.
+    pub fn factors(&self) -> Factors {
+        Factors { stiffness: 1.0 + self.estimate[K], grip: 1.0 + self.estimate[G] }
+    }
+
+    /// Takes in what the tyres give with the present factors, what is unexplained besides [m/s2, rad/s2], and the time since the
+    /// last sample [s]. Returns what the new factors explain of it.
+    pub fn learn(&mut self, given: &Given, unexplained: &Vector2<f64>, duration: f64) -> Vector2<f64> {
+        let before = self.factors();
+        let (by_stiffness, by_grip) = (given.slope / before.stiffness, given.offset / before.grip);
+        self.notice(given.slope + given.offset, duration);
+        self.P += covariance(WALK) * duration;
+        let missing = unexplained + by_stiffness * self.estimate[K] + by_grip * self.estimate[G];
+        for (i, deviation) in DEVIATION.iter().enumerate() {
+            let mut h = Vector4::zeros();
+            (h[i], h[K], h[G]) = (1.0, by_stiffness[i], by_grip[i]);
+            let column = self.P * h;
+            let variance = deviation * deviation + (LATE * self.rate[i]).powi(2);
+            let gain = column / (h.dot(&column) + variance);
+            self.estimate += gain * (missing[i] - h.dot(&self.estimate));
+            self.P -= gain * column.transpose();
+        }
+        for (i, [least, most]) in [(K, STIFFNESS), (G, GRIP)] {
+            self.estimate[i] = self.estimate[i].clamp(least - 1.0, most - 1.0);
+        }
+        let after = self.factors();
+        by_stiffness * (after.stiffness - before.stiffness) + by_grip * (after.grip - before.grip)
+    }
+
+    /// How fast the forces change.
+    fn notice(&mut self, given: Vector2<f64>, duration: f64) {
+        let kept = (-duration / MEMORY).exp();
+        let now = (given - self.given) / duration;
+        self.rate = self.rate.zip_map(&now, |lately, now| (lately * kept).max(now.abs()));
+        self.given = given;
+    }
+}
+
+/// Covariance of wind and factors with these standard deviations.
+fn covariance(deviations: [f64; 4]) -> Matrix4<f64> {
+    let deviations = Vector4::from(deviations);
+    let mut P = Matrix4::from_diagonal(&deviations.component_mul(&deviations));
+    P[(K, G)] = TOGETHER * deviations[K] * deviations[G];
+    P[(G, K)] = P[(K, G)];
+    P
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.033;
+
+    /// What believed tyres give in a slalom by their slope and by their offset, which grows with the cube of the slip.
+    fn slalom(t: f64) -> [Vector2<f64>; 2] {
+        let (s, c) = (2.0 * t).sin_cos();
+        [Vector2::new(4.0 * s, 1.5 * c), Vector2::new(2.0 * s.powi(3), 0.5 * c.powi(3))]
+    }
+
+    /// Drives for `duration` [s] on tyres with the `truth` in a wind, with an estimator that is exact; `see` sees every sample.
+    fn drive(truth: Factors, wind: Vector2<f64>, duration: f64, mut see: impl FnMut(&Friction)) -> Friction {
+        let mut friction = Friction::new();
+        let mut t = 0.0;
+        while t < duration {
+            let [slope, offset] = slalom(t);
+            let all = slope * truth.stiffness + offset * truth.grip + wind;
+            let given = |by: Factors| Given { slope: slope * by.stiffness, offset: offset * by.grip };
+            let before = given(friction.factors());
+            let unexplained = all - before.slope - before.offset;
+            let explained = friction.learn(&before, &unexplained, PERIOD);
+            let after = given(friction.factors());
+            let accounted = after.slope + after.offset + unexplained - explained;
+            assert!((accounted - all).norm() < 1e-12, "{t}: {accounted} of {all}");
+            see(&friction);
+            t += PERIOD;
+        }
+        friction
+    }
+
+    fn is_near(found: Factors, truth: Factors, tolerance: f64) -> bool {
+        (found.stiffness - truth.stiffness).abs() < tolerance && (found.grip - truth.grip).abs() < tolerance
+    }
+
+    #[test]
+    fn stiffness_and_grip_are_told_from_each_other_and_from_wind() {
+        let wind = Vector2::new(1.5, -0.4);
+        for (stiffness, grip) in [(1.0, 1.0), (0.6, 1.0), (1.2, 1.2), (0.85, 0.85), (1.1, 0.9)] {
+            let truth = Factors { stiffness, grip };
+            let found = drive(truth, wind, 60.0, |_| {});
+            // Stiffness is known to 0.03 after six periods of the slalom; grip, which shows in a quarter of the forces, after twenty.
+            assert!(is_near(found.factors(), truth, 0.03), "{:?} for {truth:?}", found.factors());
+            assert!((found.estimate.fixed_rows::<2>(0) - wind).norm() < 0.1, "{}", found.estimate);
+        }
+    }
+
+    #[test]
+    fn wind_is_not_taken_for_grip() {
+        let truth = Factors { stiffness: 1.0, grip: 1.0 };
+        // A side wind of 33 m/s from the first moment on, when nothing is known: 1.5 m/s2 of the 6 m/s2 of the tyres.
+        drive(truth, Vector2::new(1.5, 0.4), 20.0, |friction| {
+            assert!(is_near(friction.factors(), truth, 0.12), "{:?}", friction.factors());
+        });
+    }
+
+    #[test]
+    fn a_straight_road_tells_nothing_of_tyres() {
+        let mut friction = Friction::new();
+        let nothing = Given { slope: Vector2::zeros(), offset: Vector2::zeros() };
+        for k in 0..600 {
+            let gust = Vector2::new((0.1 * f64::from(k)).sin(), 0.3);
+            assert_eq!(friction.learn(&nothing, &gust, PERIOD), Vector2::zeros());
+        }
+        assert_eq!(friction.factors(), Factors { stiffness: 1.0, grip: 1.0 });
+    }
+
+    #[test]
+    fn forces_that_come_late_are_hardly_taken_for_other_forces() {
+        let (mut friction, mut worst) = (Friction::new(), 0.0_f64);
+        for k in 0..600 {
+            let t = f64::from(k) * PERIOD;
+            let [slope, offset] = slalom(t);
+            let [slope_then, offset_then] = slalom(t - 0.02);
+            let Factors { stiffness, grip } = friction.factors();
+            let given = Given { slope: slope * stiffness, offset: offset * grip };
+            friction.learn(&given, &(slope_then + offset_then - given.slope - given.offset), PERIOD);
+            worst = worst.max((friction.factors().stiffness - 1.0).abs()).max((friction.factors().grip - 1.0).abs());
+        }
+        // At 2 rad/s the forces are wrong by 4 % of their largest value.
+        assert!(worst < 0.02, "{worst}");
+    }
+
+    #[test]
+    fn what_differs_too_much_ends_at_the_bounds() {
+        let found = |factor| {
+            let truth = Factors { stiffness: factor, grip: factor };
+            drive(truth, Vector2::zeros(), 10.0, |_| {}).factors()
+        };
+        assert!(is_near(found(0.1), Factors { stiffness: STIFFNESS[0], grip: GRIP[0] }, 1e-12));
+        assert!(is_near(found(4.0), Factors { stiffness: STIFFNESS[1], grip: GRIP[1] }, 1e-12));
+    }
+
+    #[test]
+    fn factors_scale_a_magic_formula_by_similarity() {
+        let believed = |alpha: f64| 7000.0 * (1.4 * (10.0 * alpha).atan()).sin();
+        let found = Factors { stiffness: 0.6, grip: 1.1 };
+        let truth = |alpha: f64| found.grip * believed(found.slip() * alpha);
+        let slope = |f: &dyn Fn(f64) -> f64, alpha: f64| (f(alpha + 1e-6) - f(alpha - 1e-6)) / 2e-6;
+        for k in -10..=10 {
+            let alpha = 0.02 * f64::from(k);
+            let asked = found.slip() * alpha;
+            let c = slope(&believed, asked);
+            let line = Tyres { c_f: c, c_r: 0.0, f_f0: believed(asked) - c * asked, f_r0: 0.0 };
+            let Tyres { c_f, f_f0, .. } = found.apply(&line);
+            // Central differences: 1e-12 of the third derivative, and rounding of 1e-16 over 1e-6 of the force.
+            assert!((c_f - slope(&truth, alpha)).abs() < 1e-4, "{alpha}");
+            assert!((f_f0 + c_f * alpha - truth(alpha)).abs() < 1e-6, "{alpha}");
+        }
+        assert!((slope(&truth, 0.0) - found.stiffness * slope(&believed, 0.0)).abs() < 1e-3);
+    }
+}
