@@ -5,8 +5,10 @@ use crate::plots::{BLUE, Chart, Curve, GREY, ORANGE, assemble, chart};
 
 /// Lateral error at which the page cuts its curves, so that the small ones can be told apart [m].
 const SHOWN: f64 = 0.12;
+/// Friction at which the situations with sensor noise are driven [1].
+const NOMINAL: f64 = 0.82;
 
-/// Error over speed for each friction value.
+/// Error over speed for each friction value, and with sensor noise.
 pub(super) fn of(results: &[Outcome]) -> String {
     const CHARTS: [[&str; 3]; 4] = [
         ["mu04", "Friction 0.4", "The network was trained at 0.82."],
@@ -14,32 +16,45 @@ pub(super) fn of(results: &[Outcome]) -> String {
         ["mu082", "Friction 0.82", "What the network was trained for."],
         ["mu10", "Friction 1.0", ""],
     ];
-    let charts: Vec<Chart> = CHARTS
-        .into_iter()
-        .zip(FRICTION)
-        .map(|(labels, mu)| {
-            let runs: Vec<&Outcome> = results
-                .iter()
-                .filter(|r| {
-                    let Situation { road, tyre, mu: friction, noise, .. } = r.situation;
-                    road == "double_lane_change" && tyre == "dry_asphalt" && friction == mu && noise == 0.0
-                })
-                .collect();
-            let speed: Vec<f64> = runs.iter().map(|r| r.situation.speed).collect();
-            let curve = |mode: usize, color| {
-                Curve::new(MODES[mode], &speed, runs.iter().map(|r| 100.0 * r.e_y[mode].min(SHOWN)).collect(), color)
-            };
-            chart(
-                labels,
-                ["speed [m/s]", "max |e_y| [cm], cut at 12 cm"],
-                vec![curve(0, GREY).dashed(), curve(1, ORANGE), curve(2, BLUE)],
-            )
-        })
-        .collect();
+    let lane_changes = |mu: f64, noise: f64| -> Vec<&Outcome> {
+        let is_one = |Situation { road, tyre, mu: friction, noise: scale, .. }: &Situation| {
+            *road == "double_lane_change" && *tyre == "dry_asphalt" && *friction == mu && *scale == noise
+        };
+        results.iter().filter(|result| is_one(&result.situation)).collect()
+    };
+    let mut charts: Vec<Chart> =
+        CHARTS.into_iter().zip(FRICTION).map(|(labels, mu)| over_speed(labels, &lane_changes(mu, 0.0))).collect();
+    let noisy = lane_changes(NOMINAL, 1.0);
+    charts.push(over_speed(["noise", "Friction 0.82, sensor noise", &lost(&noisy)], &noisy));
     assemble(
         "Adaptation against constant stiffness",
         "Double lane change, dry asphalt tyre, ideal actuators. The network was trained at friction 0.82.",
         "",
         &charts,
     )
+}
+
+/// Error over speed of every mode: the mean over the runs that stayed on the road, and the cut where none did.
+fn over_speed(labels: [&str; 3], runs: &[&Outcome]) -> Chart {
+    let speed: Vec<f64> = runs.iter().map(|run| run.situation.speed).collect();
+    let shown = |run: &Outcome, mode: usize| 100.0 * run.mean(mode).map_or(SHOWN, |(e_y, _)| e_y.min(SHOWN));
+    let curve =
+        |mode: usize, color| Curve::new(MODES[mode], &speed, runs.iter().map(|run| shown(run, mode)).collect(), color);
+    chart(
+        labels,
+        ["speed [m/s]", "max |e_y| [cm], cut at 12 cm"],
+        vec![curve(0, GREY).dashed(), curve(1, ORANGE), curve(2, BLUE)],
+    )
+}
+
+/// What the curves leave out: the runs that left the road.
+fn lost(runs: &[&Outcome]) -> String {
+    let left = |run: &Outcome, mode: usize| {
+        let (left, all, speed) = (run.left(mode), run.runs.len(), run.situation.speed);
+        (left > 0).then(|| format!("{} at {speed:.1} m/s in {left} of {all}", MODES[mode]))
+    };
+    let all: Vec<String> =
+        runs.iter().flat_map(|run| (0..MODES.len()).filter_map(move |mode| left(run, mode))).collect();
+    let lost = if all.is_empty() { "none".to_owned() } else { all.join("; ") };
+    format!("Means over the seeds with which the car stayed on the road. Left it: {lost}.")
 }
