@@ -151,6 +151,8 @@ class Proxqp:
             self.solver = self.proxqp.dense.QP(len(f), 0, len(low))
             self.solver.settings.compute_timings = True
             self.solver.settings.eps_abs = TOLERANCE
+            # Where it solves a problem it needs some fifty; at its default, 10000, it tries the others for up to minutes.
+            self.solver.settings.max_iter = self.solver.settings.max_iter_in = 200
             self.solver.settings.initial_guess = self.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             self.solver.init(H, f, None, None, C, low, high)
         else:
