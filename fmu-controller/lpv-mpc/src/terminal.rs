@@ -27,9 +27,11 @@ const DOUBLINGS: usize = 30;
 /// Relative change that is the last [1]: the doubling converges quadratically, so what is left is its square.
 const CONVERGED: f64 = 1e-6;
 
-/// Relative change of the speed up to which the weight of the last state stays [1]: the lateral modes change by about as much. At a
-/// steady speed no sample needs a new weight; under full braking from 14 m/s, 0.26 m/s a sample, nearly every one does.
-const SAME_SPEED: f64 = 0.02;
+/// Relative change up to which the weight of the last state stays [1]: of the speed, by which the lateral modes change by about as
+/// much, and of the weight on the steering increments, by which the cost to go changes by no more, for it is a minimum of sums in
+/// which that weight stands once. At a steady speed no sample needs a new weight; under full braking from 14 m/s, 0.26 m/s a
+/// sample, nearly every one does.
+const SAME: f64 = 0.02;
 
 /// How the last state is weighed.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -38,12 +40,14 @@ pub struct Terminal {
     factor: f64,
     /// Speed that the weight in force was made for [m/s]; 0 if none was.
     v_x: f64,
+    /// Weight of the steering increments that it was made with [1/rad2]; it changes with the caution.
+    r_delta: f64,
 }
 
 impl Terminal {
     /// Of these parameters, to be weighed.
     pub fn new(p: &Parameters) -> Self {
-        Self { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0 }
+        Self { cost: p.terminal_cost, factor: p.terminal_factor, v_x: 0.0, r_delta: 0.0 }
     }
 
     /// Weighs the last state by the speed `v_x` [m/s] that the last plan ends with, so that the weight does not depend on the
@@ -56,8 +60,9 @@ impl Terminal {
         hold: &Hold,
         body: &Body,
     ) {
-        let v_x = v_x.max(V_GUARD);
-        if self.cost == TerminalCost::StageWeights || (v_x - self.v_x).abs() <= SAME_SPEED * self.v_x {
+        let (v_x, r_delta) = (v_x.max(V_GUARD), problem.r[DELTA]);
+        let is_same = |now: f64, made_for: f64| (now - made_for).abs() <= SAME * made_for;
+        if self.cost == TerminalCost::StageWeights || (is_same(v_x, self.v_x) && is_same(r_delta, self.r_delta)) {
             return;
         }
         let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x, disturbance: Disturbance::zeros() };
@@ -66,11 +71,11 @@ impl Terminal {
         x[V_X] = v_x;
         let mut end = Stage::<N_X, NU>::default();
         linearise(&Point::new(x, Input::zeros()), &straight, tyres, &around, Linear::from(&mut end));
-        // Without a solution the weight of before stays; its speed was not far.
+        // Without a solution the weight of before stays; what it was made for was not far.
         let equation = Equation { A: &end.A, B: &end.B, q: &problem.q, r: &problem.r };
         if let Some(weight) = equation.solution() {
             problem.q_terminal = weight * self.factor;
-            self.v_x = v_x;
+            (self.v_x, self.r_delta) = (v_x, r_delta);
         }
     }
 }
@@ -233,5 +238,42 @@ mod tests {
         let (A, mut B) = model(10.0);
         B.fixed_columns_mut::<1>(0).fill(0.0);
         assert_eq!(weight(&A, &B, &q, &SVector::from([p.r_delta, p.r_a_x])), None);
+    }
+
+    /// The problem of a sample whose steering increments weigh `caution` [1] times as much as given.
+    fn cautious(p: &Parameters, caution: f64) -> Problem<5, 2> {
+        let mut problem = Problem::new(p.horizon);
+        problem.q = SVector::from([p.q_v_x, p.q_v_y, p.q_yaw_rate, p.q_e_y, p.q_e_psi]);
+        problem.r = SVector::from([p.r_delta * caution, p.r_a_x]);
+        problem
+    }
+
+    #[test]
+    fn the_weight_is_that_of_the_present_caution_whatever_came_before() {
+        let p = Parameters { terminal_cost: TerminalCost::Riccati, ..Parameters::default() };
+        let (hold, body, tyres) = (Hold::new(p.t_s, [0.0, 0.0]), p.body(), p.nominal_tyres());
+        let mut driven = Terminal::new(&p);
+        let mut problem = cautious(&p, 1.0);
+        // The car brakes from 25 m/s, its latency changes, and all plans end with 10 m/s.
+        for caution in [23.0, 9.0, 1.0, 1.5, 1.0] {
+            problem.r[DELTA] = p.r_delta * caution;
+            driven.weigh(&mut problem, 10.0, &tyres, &hold, &body);
+            let mut fresh = cautious(&p, caution);
+            Terminal::new(&p).weigh(&mut fresh, 10.0, &tyres, &hold, &body);
+            assert_eq!(problem.q_terminal, fresh.q_terminal, "caution {caution}");
+        }
+    }
+
+    #[test]
+    fn small_changes_need_no_new_weight() {
+        let p = Parameters { terminal_cost: TerminalCost::Riccati, ..Parameters::default() };
+        let (hold, body, tyres) = (Hold::new(p.t_s, [0.0, 0.0]), p.body(), p.nominal_tyres());
+        let mut terminal = Terminal::new(&p);
+        let mut problem = cautious(&p, 2.0);
+        terminal.weigh(&mut problem, 10.0, &tyres, &hold, &body);
+        let made = problem.q_terminal;
+        problem.r[DELTA] *= 1.01;
+        terminal.weigh(&mut problem, 10.1, &tyres, &hold, &body);
+        assert_eq!(problem.q_terminal, made);
     }
 }
