@@ -38,6 +38,7 @@ mod tests {
 
     use crate::Parameters;
     use crate::discretise::{Discrete, Hold, discretise_into};
+    use crate::grip::TANGENT_FLOOR;
     use crate::jordan::{Belief, Measured, Memory, Network};
     use crate::model::{Disturbance, Input, Point, State, embed_at};
 
@@ -59,7 +60,7 @@ mod tests {
             let [v_x, v_y, yaw_rate, _, _] = x.into();
             let measured = Measured { v_x, v_y, yaw_rate, delta: u[0], a_x: u[1], ..Measured::default() };
             let (memory, belief) = network.linearise(&memory, &measured);
-            let (tyres, point) = (belief.tangent(0.05), Point::new(x, u));
+            let (tyres, point) = (belief.tangent(TANGENT_FLOOR), Point::new(x, u));
             let p = Parameters::default();
             let lpv = embed_at(&point, 0.02, &p.body(), &tyres, &Disturbance::zeros());
             let mut sample = Discrete::zeros();
