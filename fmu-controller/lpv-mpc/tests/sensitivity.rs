@@ -6,7 +6,7 @@ use std::path::Path;
 
 use lpv_mpc::jordan::Network;
 use lpv_mpc::preview::Preview;
-use lpv_mpc::{Controller, Error, Estimation, Inputs, Output, Parameters, Status};
+use lpv_mpc::{Adaptation, Controller, Error, Estimation, Inputs, Output, Parameters, Status, TerminalCost};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -14,14 +14,19 @@ const H: f64 = 0.011;
 
 /// A slalom whose measurements wander, so that no derivative vanishes by symmetry.
 fn inputs(t: f64) -> Inputs {
+    inputs_at(14.0, t)
+}
+
+/// The slalom at a speed [m/s].
+fn inputs_at(speed: f64, t: f64) -> Inputs {
     Inputs {
-        v_x: 14.0 + 0.3 * t.sin(),
+        v_x: speed + 0.3 * t.sin(),
         v_y: 0.1 * (2.0 * t).sin(),
         yaw_rate: 0.1 * (1.5 * t).sin(),
         e_y: 0.02 * (1.1 * t).cos(),
         e_psi: 0.01 * (0.7 * t).sin(),
         kappa_ref: Preview::from_fn(|i, _| 0.006 * (1.5 * (t + i as f64 * 0.033)).sin()),
-        v_x_ref: Preview::from_fn(|i, _| 14.0 + 0.2 * (t + i as f64 * 0.033).cos()),
+        v_x_ref: Preview::from_fn(|i, _| speed + 0.2 * (t + i as f64 * 0.033).cos()),
         mu_ref: Preview::from_fn(|i, _| 0.7 + 0.2 * (2.0 * t + i as f64 * 0.066).sin()),
         ..Inputs::default()
     }
@@ -64,10 +69,10 @@ fn advanced(controller: &Controller, t: f64, inputs: &Inputs) -> Controller {
 }
 
 fn compare(parameters: &Parameters) {
-    compare_from(Controller::new(parameters.clone(), 0.0).unwrap());
+    compare_from(Controller::new(parameters.clone(), 0.0).unwrap(), inputs);
 }
 
-fn compare_from(mut controller: Controller) {
+fn compare_from(mut controller: Controller, inputs: impl Fn(f64) -> Inputs) {
     for k in 0..30 {
         let t = f64::from(k) * H;
         let at = inputs(t);
@@ -113,10 +118,33 @@ fn derivative_of_the_papers_controller() {
 }
 
 #[test]
-fn derivative_follows_the_network_along_the_horizon() {
+fn derivative_with_the_cost_of_driving_on() {
+    compare(&Parameters { terminal_cost: TerminalCost::Riccati, ..Parameters::default() });
+}
+
+#[test]
+fn derivative_where_steering_is_dear() {
+    // 25 m/s and 0.2 s of delay make the increments of steering weigh more than twenty times as much.
+    for terminal_cost in [TerminalCost::StageWeights, TerminalCost::Riccati] {
+        let parameters = Parameters { input_delay: 0.2, terminal_cost, ..Parameters::default() };
+        compare_from(Controller::new(parameters, 0.0).unwrap(), |t| inputs_at(25.0, t));
+    }
+}
+
+fn network() -> Network {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../resources/jordan.json");
-    let network = Network::from_json(&fs::read_to_string(file).unwrap()).unwrap();
-    compare_from(Controller::with_network(Parameters::adaptive(), 0.0, network).unwrap());
+    Network::from_json(&fs::read_to_string(file).unwrap()).unwrap()
+}
+
+#[test]
+fn derivative_follows_the_network_along_the_horizon() {
+    compare_from(Controller::with_network(Parameters::adaptive(), 0.0, network()).unwrap(), inputs);
+}
+
+#[test]
+fn derivative_goes_through_what_the_network_believes_now() {
+    let parameters = Parameters { adaptation: Adaptation::NetworkNow, ..Parameters::default() };
+    compare_from(Controller::with_network(parameters, 0.0, network()).unwrap(), inputs);
 }
 
 #[test]
