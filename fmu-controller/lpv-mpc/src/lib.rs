@@ -22,6 +22,10 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
 
+// What the tests of this crate share with those beside it names the crate from outside.
+#[cfg(test)]
+extern crate self as lpv_mpc;
+
 pub mod adaptation;
 mod ahead;
 mod angles;
@@ -46,6 +50,9 @@ pub mod parameters;
 mod plan;
 pub mod preview;
 pub mod qp;
+#[cfg(test)]
+#[path = "../tests/qp_support/mod.rs"]
+mod qp_support;
 mod recovery;
 mod scalar;
 mod sensitivity;

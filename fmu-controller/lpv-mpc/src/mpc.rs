@@ -25,8 +25,8 @@ use crate::terminal::Terminal;
 /// change: the third changes the first command by less than 1e-3 of its bound.
 const FIRST_PASSES: usize = 3;
 
-/// Speed below which a car that is to stand holds its steering [m/s]: seven standard deviations of the speed's sensor. With sensor
-/// noise and without this, `cargo fmu robustness --case stop_steering_noise` sees the wheels turn by 2.9 deg.
+/// Speed below which a car that is to stand holds its steering [m/s]: seven standard deviations of the speed's sensor. With
+/// sensor noise and without this, `cargo fmu robustness --case stop_steering_noise` sees the wheels turn by 2.9 deg.
 const STANDSTILL: f64 = 0.2;
 
 /// A car that is to stand does not want to drive away sooner [s]: at the default rate 0.1 rad are steered meanwhile.
@@ -275,4 +275,29 @@ impl<const N_X: usize, M: TyreModel> Work for Modelling<'_, N_X, M> {
 
 fn clarabel<const N_X: usize>() -> Clarabel<N_X, NU> {
     Clarabel::new(CLARABEL_TOLERANCE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::qp_support::{Stress, random_problem};
+
+    #[test]
+    fn what_the_structured_solver_gives_up_on_the_second_one_answers() {
+        let stress = Stress {
+            seed: 3_394_388_587_556_721_806,
+            horizon: 6,
+            growth: -0.886_823_979_581_132_5,
+            decades: 4.873_882_601_602_099,
+            demand: 0.123_674_979_757_486_06,
+            degenerate: false,
+            outside: false,
+        };
+        let mut mpc = Mpc::<NX>::new(&Parameters { horizon: stress.horizon, ..Parameters::default() });
+        mpc.problem = random_problem(&stress);
+        mpc.structured.solve(&mpc.problem, &mut mpc.solution);
+        assert_eq!(mpc.solution.outcome, Outcome::MaxIterations, "the case must be one");
+        assert!(mpc.solve());
+        assert_eq!(mpc.solution.outcome, Outcome::SecondSolver);
+    }
 }
