@@ -304,9 +304,9 @@ mod tests {
                 match name { $(stringify!($field) => { p.$field = f64::NAN; true })* _ => false }
             };
         }
-        let is_real = reals!(m i_z l_f l_r c_d area rho c_rr g mu grip_max c_f_nominal c_r_nominal t_s q_v_x q_v_y q_yaw_rate q_e_y
-            q_e_psi r_delta r_a_x terminal_factor delta_max delta_rate_max a_x_min a_x_max a_x_rate_max e_y_max
-            e_y_penalty input_delay tau_delta tau_a_x sensor_noise);
+        let is_real = reals!(m i_z l_f l_r c_d area rho c_rr g mu grip_max c_f_nominal c_r_nominal t_s q_v_x q_v_y
+            q_yaw_rate q_e_y q_e_psi r_delta r_a_x terminal_factor delta_max delta_rate_max a_x_min a_x_max a_x_rate_max
+            e_y_max e_y_penalty input_delay tau_delta tau_a_x sensor_noise);
         assert!(
             is_real
                 || ["horizon", "terminal_cost", "adaptation", "backend", "estimation", "v_y_measured"].contains(&name),

@@ -13,9 +13,9 @@ use super::riccati::Factor;
 use super::{Outcome, Problem, Solution, Structured};
 use nalgebra::SVector;
 
-// Fraction to the boundary, centring, trials and start (`start`) were chosen together for the least work on the recorded problems:
-// with the iteration counted as two sweeps, N = 40 takes 26 sweeps on average, at most 39; customary values (0.995, third power,
-// three sweeps of a trial, start at 0.05 and 0.1) take 33 and 52.
+// Fraction to the boundary, centring, trials and start (`start`) were chosen together for the least work on the recorded
+// problems: with the iteration counted as two sweeps, N = 40 takes 26 sweeps on average, at most 39; customary values (0.995,
+// third power, three sweeps of a trial, start at 0.05 and 0.1) take 33 and 52.
 
 /// Iterations after which the plan at hand is all there is.
 const ITERATIONS_MAX: u32 = 40;
