@@ -184,7 +184,14 @@ class Planner:
         }
         options = {
             "print_time": False,
-            "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 200, "mu_init": 1e-4, "warm_start_init_point": "yes"},
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": 1e-9,
+                "max_iter": 200,
+                "mu_init": 1e-4,
+                "warm_start_init_point": "yes",
+            },
         }
         self.solver = ca.nlpsol("planner", "ipopt", problem, options)
         free = np.full(nx * (horizon + 1), np.inf)
@@ -299,7 +306,8 @@ def main():
         columns = dict(zip(["t", *RECORDED, "delta", "a_x", "solve_time", "iterations"], rows.T))
         e_y, speed = columns["e_y_true"], columns["v_x_true"] - columns["v_x_ref[1]"]
         print(
-            f"{run}: {len(rows)} samples, lateral error {100 * np.abs(e_y).max():.3f} cm, rms {100 * np.sqrt(np.mean(e_y**2)):.3f} cm, "
+            f"{run}: {len(rows)} samples, "
+            f"lateral error {100 * np.abs(e_y).max():.3f} cm, rms {100 * np.sqrt(np.mean(e_y**2)):.3f} cm, "
             f"speed error rms {np.sqrt(np.mean(speed**2)):.5f} m/s, {1e3 * np.median(columns['solve_time']):.1f} ms a sample"
         )
     save(arguments.output, runs, weights)
