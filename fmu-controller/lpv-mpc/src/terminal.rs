@@ -27,9 +27,9 @@ const DOUBLINGS: usize = 30;
 /// Relative change that is the last [1]: the doubling converges quadratically, so what is left is its square.
 const CONVERGED: f64 = 1e-6;
 
-/// Relative change up to which the weight of the last state stays [1]: of the speed, by which the lateral modes change by about as
-/// much, and of the weight on the steering increments, by which the cost to go changes by no more, for it is a minimum of sums in
-/// which that weight stands once. At a steady speed no sample needs a new weight; under full braking from 14 m/s, 0.26 m/s a
+/// Relative change up to which the weight of the last state stays [1]: of the speed, by which the lateral modes change by about
+/// as much, and of the weight on the steering increments, by which the cost to go changes by no more, for it is the least of sums
+/// in which that weight stands once. At a steady speed no sample needs a new weight; under full braking from 14 m/s, 0.26 m/s a
 /// sample, nearly every one does.
 const SAME: f64 = 0.02;
 
