@@ -296,7 +296,8 @@ def check_directional_derivatives_agree_with_differences(fmu):
         assert slave.SetFMUstate(before) == OK
         assert slave.set(variable.name, value) == OK
         if sampled:
-            assert slave.step(t, h) == OK
+            # The measurements of this check belong to no car, so the filter may doubt them.
+            assert slave.step(t, h) in (OK, WARNING)
         return slave.reals(outputs)
 
     acting = 0

@@ -223,7 +223,9 @@ impl Controller {
     #[inline(always)]
     fn sample(&mut self, t: f64, h: f64, inputs: &Inputs) {
         let (duration, delivered) = self.latency.advance(t);
-        if self.parameters.estimation == Estimation::Kalman {
+        // Tyres are judged by what was measured, not by what was made up for it.
+        let is_known = self.output.status < Status::Estimated && self.estimator.is_settled();
+        if self.parameters.estimation == Estimation::Kalman && is_known {
             let Self { beliefs: Beliefs { body, tyres, .. }, estimator, snapshot, .. } = self;
             tyres.learn(&estimator.x, &snapshot.delivered, &mut estimator.trend.now, duration, body);
         }

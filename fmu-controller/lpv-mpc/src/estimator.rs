@@ -35,8 +35,9 @@ const WALK: [f64; 3] = [1.0, 3.0, 3.0];
 /// of the preview, a tenth of a sensor's deviation a second.
 const MODEL: [f64; NX] = [0.003, 0.003, 0.0002, 0.001, 0.0002];
 
-/// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind.
-const INITIAL: [f64; 3] = [1.0, 1.0, 0.5];
+/// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind from the side, and along
+/// the car of a steep road (1 m/s2 at 10 %) in a head wind of 50 m/s (1.2 m/s2).
+pub(crate) const INITIAL: [f64; 3] = [2.0, 1.0, 0.5];
 
 /// Largest difference between a measurement and its estimate that is no other situation [m/s, m/s, rad/s, m, rad]: 60 and
 /// more standard deviations of the sensors, and more than any car does between two samples.
@@ -49,10 +50,13 @@ const JUMP_RATE: f64 = 10.0;
 /// assumed reaches it once in twenty measurements, the assumed one never.
 const OUTLIER: f64 = 8.0;
 
+/// Time after a start until the disturbances are those that the car shows [s]: six samples.
+const SETTLED: f64 = 0.2;
+
 /// Part of the trend by which the filter moves a disturbance on between two measurements [1]: a random walk lags behind a ramp.
 ///
-/// Half of it takes the general track from 0.057 to 0.041 cm (root mean square, sensors taken as told); all of it gains no
-/// more than another 0.002 cm, and steers the lane change with delay and noise to 3.0 cm instead of 2.7.
+/// With half of it the general track is followed to 0.041 cm (root mean square, the sensors' noise taken as told) instead of 0.057;
+/// all of it gains 0.002 cm more, and steers the lane change with delay and noise to 3.0 cm instead of 2.7.
 const TREND_SHARE: f64 = 0.5;
 
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
@@ -73,6 +77,8 @@ pub struct Estimator<T: Scalar = f64> {
     sensor_noise: f64,
     /// What of it they have.
     noise: NoiseLevel,
+    /// Time since the filter started [s].
+    age: f64,
 }
 
 impl<T: Scalar> Estimator<T> {
@@ -87,6 +93,7 @@ impl<T: Scalar> Estimator<T> {
             left_out: [false; NX],
             sensor_noise,
             noise: NoiseLevel::new(),
+            age: 0.0,
         }
     }
 
@@ -106,30 +113,33 @@ impl<T: Scalar> Estimator<T> {
     ) -> bool {
         let disturbance = self.trend.now;
         let kappa = if kappa.re().is_finite() { kappa } else { self.kappa };
-        if !self.started {
-            self.start(measured);
-        } else if duration > 0.0 {
+        if self.started && duration > 0.0 {
             self.predict((self.kappa + kappa) * 0.5, input, duration, body, tyres);
         }
         self.kappa = kappa;
+        self.age += duration;
         let far = |i: usize| {
             // Written so that an estimate that is no number any more is far from everything.
             let near = (measured[i] - self.x[i]).re().abs() <= JUMP_MAX[i] * (1.0 + JUMP_RATE * duration);
             measured[i].re().is_finite() && !near
         };
         let restarts = self.started && (0..NX).any(far) && self.start(measured);
+        if restarts || !self.started && self.start(measured) {
+            // What it starts from tells nothing besides.
+            return restarts;
+        }
         let before = self.left_out;
         for (i, z) in measured.iter().enumerate() {
-            self.left_out[i] = z.re().is_finite() && !restarts && !before[i] && self.is_outlier(i, *z);
+            self.left_out[i] = z.re().is_finite() && !before[i] && self.is_outlier(i, *z);
             if z.re().is_finite() && !self.left_out[i] {
                 self.correct(i, *z);
             }
         }
         self.noise.update(duration);
-        if duration > 0.0 && !restarts {
+        if duration > 0.0 {
             self.trend.follow(&disturbance, duration);
         }
-        restarts
+        false
     }
 
     /// The same filter on dual numbers, every derivative zero.
@@ -146,12 +156,18 @@ impl<T: Scalar> Estimator<T> {
             left_out: self.left_out,
             sensor_noise: self.sensor_noise,
             noise: self.noise,
+            age: self.age,
         }
     }
 
     /// Whether a measurement was left out in the last update because no car in the estimated state would show it.
     pub fn doubts(&self) -> bool {
         self.left_out.contains(&true)
+    }
+
+    /// Whether enough has been measured since the start for the disturbances to be what the car shows.
+    pub fn is_settled(&self) -> bool {
+        self.age > SETTLED
     }
 
     /// Whether there is an estimate at all.
@@ -167,6 +183,8 @@ impl<T: Scalar> Estimator<T> {
             return false;
         }
         self.started = true;
+        self.age = 0.0;
+        self.left_out = [false; NX];
         self.trend = Trend::steady(Disturbance::zeros());
         self.x = measured.map(|z| if z.re().is_finite() { z } else { T::zero() });
         let mut deviation = SVector::<f64, NZ>::zeros();

@@ -14,6 +14,7 @@
 use nalgebra::{Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
+use crate::estimator;
 use crate::model::{Body, Disturbance, Input, State, Tyres, V_X, V_Y, YAW_RATE, derivative};
 
 /// Smallest and largest factor on the stiffness [1].
@@ -30,11 +31,16 @@ const GRIP: [f64; 2] = [0.8, 1.25];
 
 /// Standard deviations before anything is known, of wind [m/s2, rad/s2] as the estimator takes it, and of the factors [1]: those of
 /// friction between 0.4 and 1.
-const INITIAL: [f64; 4] = [1.0, 0.5, 0.3, 0.3];
+const INITIAL: [f64; 4] = [estimator::INITIAL[V_Y], estimator::INITIAL[YAW_RATE], 0.3, 0.3];
 
 /// Intensities of the random walks [m/s2, rad/s2, 1, 1 per root second]: gusts of the general track, and roads that change within
 /// seconds. Half and twice the wind's change nothing by more than a twentieth.
+///
+/// Those of the factors end where they would make them less certain than at first: a long straight tells nothing.
 const WALK: [f64; 4] = [0.5, 0.25, 0.1, 0.1];
+
+/// Largest rate of the forces that is remembered [m/s3, rad/s3]: 20 m/s2, twice what tyres give, within a sample.
+const RATE_MAX: f64 = 600.0;
 
 /// How far stiffness and grip go together [1]: a road changes both alike, another tyre each in its own way. With 0.4 the lane change
 /// at friction 1 and 15.2 m/s is 0.3 mm worse, with 0.9 that at friction 0.4 and 12 m/s leaves the road where the patch is not seen.
@@ -138,7 +144,7 @@ impl Friction {
         let before = self.factors();
         let (by_stiffness, by_grip) = (given.slope / before.stiffness, given.offset / before.grip);
         self.notice(given.slope + given.offset, duration);
-        self.P += covariance(WALK) * duration;
+        self.forget(duration);
         let missing = unexplained + by_stiffness * self.estimate[K] + by_grip * self.estimate[G];
         for (i, deviation) in DEVIATION.iter().enumerate() {
             let mut h = Vector4::zeros();
@@ -149,6 +155,10 @@ impl Friction {
             self.estimate += gain * (missing[i] - h.dot(&self.estimate));
             self.P -= gain * column.transpose();
         }
+        if !self.estimate.iter().chain(&self.P).all(|value| value.is_finite()) {
+            // The numbers were too large: nothing is known any more.
+            *self = Self::new();
+        }
         for (i, [least, most]) in [(K, STIFFNESS), (G, GRIP)] {
             self.estimate[i] = self.estimate[i].clamp(least - 1.0, most - 1.0);
         }
@@ -156,11 +166,20 @@ impl Friction {
         by_stiffness * (after.stiffness - before.stiffness) + by_grip * (after.grip - before.grip)
     }
 
+    /// What was found becomes less certain with time.
+    fn forget(&mut self, duration: f64) {
+        let certain = [K, G].map(|i| 1.0 - (self.P[(i, i)] / (INITIAL[i] * INITIAL[i])).powi(2));
+        let share = certain[0].min(certain[1]).max(0.0) * duration;
+        let [wind, yaw, stiffness, grip] = WALK;
+        let scale = [duration, duration, share, share].map(f64::sqrt);
+        self.P += covariance([wind * scale[0], yaw * scale[1], stiffness * scale[2], grip * scale[3]]);
+    }
+
     /// How fast the forces change.
     fn notice(&mut self, given: Vector2<f64>, duration: f64) {
         let kept = (-duration / MEMORY).exp();
         let now = (given - self.given) / duration;
-        self.rate = self.rate.zip_map(&now, |lately, now| (lately * kept).max(now.abs()));
+        self.rate = self.rate.zip_map(&now, |lately, now| (lately * kept).max(now.abs()).min(RATE_MAX));
         self.given = given;
     }
 }
@@ -240,6 +259,41 @@ mod tests {
             assert_eq!(friction.learn(&nothing, &gust, PERIOD), Vector2::zeros());
         }
         assert_eq!(friction.factors(), Factors { stiffness: 1.0, grip: 1.0 });
+    }
+
+    #[test]
+    fn after_a_long_straight_wind_is_taken_for_tyres_no_more_than_at_first() {
+        let worst = |straight: u32| {
+            let mut friction = Friction::new();
+            let nothing = Given { slope: Vector2::zeros(), offset: Vector2::zeros() };
+            for _ in 0..straight {
+                friction.learn(&nothing, &Vector2::zeros(), PERIOD);
+            }
+            let mut worst = 0.0_f64;
+            // A gentle bend in which a wind comes up with the forces of the tyres, which are as believed.
+            for k in 0..100 {
+                let share = (f64::from(k) * PERIOD).min(1.0);
+                let Factors { stiffness, .. } = friction.factors();
+                let given = Given { slope: Vector2::new(1.0, 0.3) * share * stiffness, offset: Vector2::zeros() };
+                let all = Vector2::new(1.5, 0.4) * share;
+                friction.learn(&given, &(all - given.slope), PERIOD);
+                worst = worst.max((friction.factors().stiffness - 1.0).abs());
+            }
+            worst
+        };
+        // A quarter of an hour.
+        let (at_first, later) = (worst(30), worst(27_000));
+        assert!(later < at_first + 0.02, "{later}, at first {at_first}");
+    }
+
+    #[test]
+    fn numbers_beyond_all_bounds_are_forgotten() {
+        let mut friction = Friction::new();
+        let huge = Given { slope: Vector2::new(1e300, 1e300), offset: Vector2::new(-1e300, 1e200) };
+        friction.learn(&huge, &Vector2::new(1e300, -1e300), PERIOD);
+        let Factors { stiffness, grip } = friction.factors();
+        assert!((STIFFNESS[0]..=STIFFNESS[1]).contains(&stiffness) && (GRIP[0]..=GRIP[1]).contains(&grip));
+        assert!(friction.P.iter().all(|value| value.is_finite()));
     }
 
     #[test]

@@ -7,12 +7,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Time over which the level is averaged [s]: 30 samples of the sensors, a fifth of a lane change. With 3 s `cargo fmu robustness --case
-/// crosswind_peak` says 2.1 cm, with 1 s 1.8; under noise nothing changes.
+/// Time over which the level is averaged [s]: 30 samples of the sensors. With 3 s a gust is answered 0.3 cm worse (`cargo fmu robustness
+/// --case crosswind_peak`), under noise nothing changes.
 const MEMORY: f64 = 1.0;
 
-/// Samples that the first level counts for [1]: as a mean, so that sensors without noise are known as such within a second.
-const FIRST: f64 = 5.0;
+/// Samples that the first level counts for [1]: as in a mean, so that sensors without noise are known as such soon.
+const FIRST: f64 = 2.0;
 
 /// Smallest share of the told variance [1]: a tenth of the deviation, where the general track is followed as well as with none.
 const SHARE_MIN: f64 = 0.01;
@@ -21,7 +21,13 @@ const SHARE_MIN: f64 = 0.01;
 /// road is no noise.
 const SURPRISE_MAX: f64 = 9.0;
 
-/// Level of the sensors' noise.
+/// How many times more a sensor counts that is worse than the level than one that is better [1].
+///
+/// One noisy sensor among four exact ones holds the level at half of its variance; counted alike it would be at a fifth. Where all
+/// are alike the level is at most five times their variance, twice their deviation.
+const CAUTION: f64 = 4.0;
+
+/// Level of the noise of all sensors together, beside what is told of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NoiseLevel {
     /// Share of the told variance [1].
@@ -47,8 +53,9 @@ impl NoiseLevel {
     ///
     /// Where the model is less certain than the sensor the innovation says little of the sensor, and counts as little.
     pub fn observe(&mut self, innovation: f64, expected: f64, of_sensor: f64) {
-        let squared = (innovation * innovation / expected).min(SURPRISE_MAX);
-        self.surprise += of_sensor / expected * (squared - 1.0);
+        let excess = (innovation * innovation / expected).min(SURPRISE_MAX) - 1.0;
+        let counted = if excess > 0.0 { CAUTION * excess } else { excess };
+        self.surprise += of_sensor / expected * counted;
     }
 
     /// Takes over what the measurements of a sample say, which is `duration` [s] after the one before.
@@ -68,25 +75,27 @@ mod tests {
 
     const PERIOD: f64 = 0.033;
 
-    /// Mean share of the told variance that a scalar filter finds in the last half of a minute, whose sensor has `true_share` of
-    /// it and whose random walk is as told.
-    fn found(true_share: f64, seed: u64) -> f64 {
+    /// Mean share of the told variance that a filter finds in the last half of a minute. Each of its sensors has its own
+    /// share of it, and sees its own random walk, which is as told.
+    fn found(true_shares: &[f64], seed: u64) -> f64 {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         // Twelve uniform numbers have variance one.
         let mut normal = || (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
-        let (told, walk) = (1.0, 0.1_f64);
-        let (mut x, mut estimate, mut variance) = (0.0, 0.0, 1.0);
+        let walk = 0.1_f64;
+        let mut filters: Vec<_> = true_shares.iter().map(|share| (*share, 0.0, 0.0, 1.0)).collect();
         let mut level = NoiseLevel::new();
         let (mut sum, mut count) = (0.0, 0.0);
         for k in 0..2000 {
-            x += walk.sqrt() * normal();
-            variance += walk;
-            let of_sensor = told * level.share();
-            let innovation = x + true_share.sqrt() * normal() - estimate;
-            level.observe(innovation, variance + of_sensor, of_sensor);
-            let gain = variance / (variance + of_sensor);
-            estimate += gain * innovation;
-            variance *= 1.0 - gain;
+            let of_sensor = level.share();
+            for (true_share, x, estimate, variance) in &mut filters {
+                *x += walk.sqrt() * normal();
+                *variance += walk;
+                let innovation = *x + true_share.sqrt() * normal() - *estimate;
+                level.observe(innovation, *variance + of_sensor, of_sensor);
+                let gain = *variance / (*variance + of_sensor);
+                *estimate += gain * innovation;
+                *variance *= 1.0 - gain;
+            }
             level.update(PERIOD);
             if k >= 1000 {
                 sum += level.share();
@@ -96,20 +105,29 @@ mod tests {
         sum / count
     }
 
+    fn mean(true_shares: &[f64]) -> f64 {
+        (0..10).map(|seed| found(true_shares, seed)).sum::<f64>() / 10.0
+    }
+
     #[test]
-    fn a_better_sensor_is_recognised() {
-        for true_share in [0.1, 0.25, 0.5] {
-            let mean = (0..10).map(|seed| found(true_share, seed)).sum::<f64>() / 10.0;
-            // The level is a mean over some 30 squares and jumps by a quarter; its logarithm is what is averaged.
-            assert!((mean / true_share - 1.0).abs() < 0.3, "{mean} for {true_share}");
+    fn better_sensors_are_recognised_and_not_taken_for_better_than_they_are() {
+        for share in [0.03, 0.1, 0.25] {
+            let mean = mean(&[share; 5]);
+            assert!(mean > share && mean < 5.0 * share, "{mean} for {share}");
         }
     }
 
     #[test]
+    fn one_noisy_sensor_among_exact_ones_holds_the_level() {
+        let mean = mean(&[1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(mean > 0.4 && mean < 0.9, "{mean}");
+    }
+
+    #[test]
     fn noise_as_told_or_worse_is_taken_as_told() {
-        for true_share in [1.0, 9.0] {
-            let mean = (0..10).map(|seed| found(true_share, seed)).sum::<f64>() / 10.0;
-            assert!(mean > 0.8, "{mean} for {true_share}");
+        for share in [1.0, 9.0] {
+            let mean = mean(&[share; 5]);
+            assert!(mean > 0.9, "{mean} for {share}");
         }
     }
 
@@ -129,7 +147,7 @@ mod tests {
     #[test]
     fn one_gust_is_no_noise() {
         let mut level = NoiseLevel { share: 0.1, samples: 1000, surprise: 0.0 };
-        level.observe(1e6, 1.0, 0.5);
+        level.observe(1e6, 1.0, 0.1);
         level.update(PERIOD);
         assert!(level.share() < 0.12, "{}", level.share());
     }
