@@ -229,8 +229,8 @@ mod tests {
     fn the_printed_model_leaves_the_road_and_the_corrected_one_does_not() {
         let shots = shots().unwrap();
         let of = |name: &str| shots.iter().find(|shot| shot.name == name).unwrap();
-        // Before the first curve: there is not even a lane change yet.
-        assert!(of("as printed").left.unwrap() < 4.0);
+        // On the first 105 m of 200, which begin with a straight of 40 m.
+        assert!(of("as printed").left.unwrap() < 7.5);
         assert_eq!(of("corrected").left, None);
         let e_y = of("corrected").recording.column("e_y_true").iter().fold(0.0_f64, |max, e| max.max(e.abs()));
         assert!(e_y < 0.023, "worse than the paper's 2.3 cm: {e_y} m");
