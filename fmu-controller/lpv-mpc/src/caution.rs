@@ -3,12 +3,12 @@
 //! A steering angle gives `v_x^2 / L` times itself as lateral acceleration. A weight on the steering's increments that is the
 //! same at all speeds therefore weighs those of the acceleration by `v_x^-4`: the faster the car, the faster the loop closes. The
 //! prediction over the latency makes up for a latency that is known; what remains of it, unknown, and of a car that is not
-//! the believed one, swings up when the loop closes faster than its commands arrive. So beyond [`SPEED`] the weight rises
-//! as `v_x^4`, and in proportion to the latency.
+//! the believed one, swings up when the loop closes faster than its commands arrive. So the weight rises as `v_x^4`, and in
+//! proportion to what the latency has over [`LATENCY`]; where that would be less than the weight given, it does not.
 //!
-//! Measured on the general track, up to 25 m/s, and on the straight in a gust, with delays of 0.1 to 0.25 s that are assumed right
-//! or 20 ms wrong (`cargo fmu robustness --case fast_wrong`, `--case fast_gust`): without this the car is lost with delays from
-//! 0.15 s on, with it the path is left by at most 26 cm. Lags count for nothing here: they are slow, but never late.
+//! Measured on the general track, up to 25 m/s, and on the straight in a gust, with delays of 0.1 to 0.25 s that are assumed
+//! right or 20 ms wrong (`cargo fmu robustness --case fast_wrong`, `--case fast_gust`): without this the car is lost with delays
+//! from 0.15 s on, with it the path is left by at most 30 cm. Lags count for nothing here: they are slow, but never late.
 
 /// Speed up to which the weight holds at twice [`LATENCY`] [m/s]: those of the cases that it was chosen with.
 const SPEED: f64 = 15.0;

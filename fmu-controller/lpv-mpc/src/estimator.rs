@@ -35,8 +35,8 @@ const WALK: [f64; 3] = [1.0, 3.0, 3.0];
 /// of the preview, a tenth of a sensor's deviation a second.
 const MODEL: [f64; NX] = [0.003, 0.003, 0.0002, 0.001, 0.0002];
 
-/// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind from the side, and along
-/// the car of a steep road (1 m/s2 at 10 %) in a head wind of 50 m/s (1.2 m/s2).
+/// Standard deviations of the disturbances before anything is known [m/s2, m/s2, rad/s2]: those of a strong wind from the side,
+/// and along the car of a steep road (1 m/s2 at 10 %) in a head wind of 50 m/s (1.2 m/s2).
 pub(crate) const INITIAL: [f64; 3] = [2.0, 1.0, 0.5];
 
 /// Largest difference between a measurement and its estimate that is no other situation [m/s, m/s, rad/s, m, rad]: 60 and
@@ -55,8 +55,8 @@ const SETTLED: f64 = 0.2;
 
 /// Part of the trend by which the filter moves a disturbance on between two measurements [1]: a random walk lags behind a ramp.
 ///
-/// With half of it the general track is followed to 0.041 cm (root mean square, the sensors' noise taken as told) instead of 0.057;
-/// all of it gains 0.002 cm more, and steers the lane change with delay and noise to 3.0 cm instead of 2.7.
+/// With half of it the general track is followed to 0.041 cm (root mean square, the sensors' noise taken as told) instead of
+/// 0.057; all of it gains 0.002 cm more, and steers the lane change with delay and noise to 3.0 cm instead of 2.7.
 const TREND_SHARE: f64 = 0.5;
 
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.

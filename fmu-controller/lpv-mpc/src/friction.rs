@@ -7,8 +7,8 @@
 //!
 //! The factors are those of the similarity method, [Pacejka, section 4.2]: `F = g F_0(k alpha / g)` keeps the form of the
 //! believed tyre `F_0`, has `k` times its slope at small slip and ends at `g` times its force. Its derivatives are
-//! the two parts of the tangent model `F = C alpha + F_offset` of the prediction: along `k` the part with the slope, along `g` the
-//! offset. So at small slip a car shows how stiff its tyres are, near their peak how much grip there is; in
+//! the two parts of the tangent model `F = C alpha + F_offset` of the prediction: along `k` the part with the slope, along `g`
+//! the offset. So at small slip a car shows how stiff its tyres are, near their peak how much grip there is; in
 //! between each follows the other in part, because a slippery road takes both.
 
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -19,18 +19,18 @@ use crate::model::{Body, Disturbance, Input, State, Tyres, V_X, V_Y, YAW_RATE, d
 
 /// Smallest and largest factor on the stiffness [1].
 ///
-/// A tyre of half the believed stiffness, and friction of 0.4 where 0.82 is believed, lie at the lower end. With 0.4 the lane change
-/// at 13.8 m/s on the `linear` tyre, untold, grows from 2.3 to 3.2 cm.
+/// A tyre of half the believed stiffness, and friction of 0.4 where 0.82 is believed, lie at the lower end. With 0.4 the lane
+/// change at 13.8 m/s on the `linear` tyre, untold, grows from 2.3 to 3.2 cm.
 const STIFFNESS: [f64; 2] = [0.5, 1.5];
 
 /// Smallest and largest factor on the grip [1].
 ///
-/// Friction of 1 where 0.82 is believed is 1.22. A soft tyre must not be taken for a road on which nothing holds: with 0.7 and 1.3
-/// the same lane change grows from 1.9 to 2.3 cm, and that at friction 0.4 and 11.4 m/s from 0.5 to 0.7 cm.
+/// Friction of 1 where 0.82 is believed is 1.22. A soft tyre must not be taken for a road on which nothing holds: with 0.7 and
+/// 1.3 the same lane change grows from 1.9 to 2.3 cm, and that at friction 0.4 and 11.4 m/s from 0.5 to 0.7 cm.
 const GRIP: [f64; 2] = [0.8, 1.25];
 
-/// Standard deviations before anything is known, of wind [m/s2, rad/s2] as the estimator takes it, and of the factors [1]: those of
-/// friction between 0.4 and 1.
+/// Standard deviations before anything is known, of wind [m/s2, rad/s2] as the estimator takes it, and of the factors [1]: those
+/// of friction between 0.4 and 1.
 const INITIAL: [f64; 4] = [estimator::INITIAL[V_Y], estimator::INITIAL[YAW_RATE], 0.3, 0.3];
 
 /// Intensities of the random walks [m/s2, rad/s2, 1, 1 per root second]: gusts of the general track, and roads that change within
@@ -42,12 +42,14 @@ const WALK: [f64; 4] = [0.5, 0.25, 0.1, 0.1];
 /// Largest rate of the forces that is remembered [m/s3, rad/s3]: 20 m/s2, twice what tyres give, within a sample.
 const RATE_MAX: f64 = 600.0;
 
-/// How far stiffness and grip go together [1]: a road changes both alike, another tyre each in its own way. With 0.4 the lane change
-/// at friction 1 and 15.2 m/s is 0.3 mm worse, with 0.9 that at friction 0.4 and 12 m/s leaves the road where the patch is not seen.
+/// How far stiffness and grip go together [1]: a road changes both alike, another tyre each in its own way. With 0.4 the lane
+/// change at friction 1 and 15.2 m/s is 0.3 mm worse, with 0.9 that at friction 0.4 and 12 m/s leaves the road where the patch
+/// is not seen.
 const TOGETHER: f64 = 0.7;
 
 /// Standard deviations of the unexplained accelerations [m/s2, rad/s2]: twice what the estimator's own covariance settles to
-/// under one unit of sensor noise, because its errors last for two samples. Half and twice that change nothing by more than 0.2 mm.
+/// under one unit of sensor noise, because its errors last for two samples. Half and twice that change nothing by more than
+/// 0.2 mm.
 const DEVIATION: [f64; 2] = [1.5, 0.3];
 
 /// Time by which a force may be off [s]: while the tyres' accelerations change, this times their rate adds to [`DEVIATION`].
@@ -235,7 +237,8 @@ mod tests {
         for (stiffness, grip) in [(1.0, 1.0), (0.6, 1.0), (1.2, 1.2), (0.85, 0.85), (1.1, 0.9)] {
             let truth = Factors { stiffness, grip };
             let found = drive(truth, wind, 60.0, |_| {});
-            // Stiffness is known to 0.03 after six periods of the slalom; grip, which shows in a quarter of the forces, after twenty.
+            // Stiffness is known to 0.03 after six periods of the slalom; grip, which shows in a quarter of the forces, after
+            // twenty.
             assert!(is_near(found.factors(), truth, 0.03), "{:?} for {truth:?}", found.factors());
             assert!((found.estimate.fixed_rows::<2>(0) - wind).norm() < 0.1, "{}", found.estimate);
         }

@@ -24,7 +24,7 @@ impl<W: Work> WithSimd for Lanes<W> {
 
 /// Does `work` with the widest vectors that the processor at hand has.
 ///
-/// Nothing is reordered or fused for them, so the bits are the same on every processor.
+/// Nothing is reordered or fused for them: wider vectors give the same bits.
 #[inline(always)]
 pub fn widest<W: Work>(work: W) -> W::Output {
     Arch::new().dispatch(Lanes(work))

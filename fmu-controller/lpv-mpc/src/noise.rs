@@ -7,8 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Time over which the level is averaged [s]: 30 samples of the sensors. With 3 s a gust is answered 0.3 cm worse (`cargo fmu robustness
-/// --case crosswind_peak`), under noise nothing changes.
+/// Time over which the level is averaged [s]: 30 samples of the sensors. With 3 s a gust is answered 0.3 cm worse
+/// (`cargo fmu robustness --case crosswind_peak`), under noise nothing changes.
 const MEMORY: f64 = 1.0;
 
 /// Samples that the first level counts for [1]: as in a mean, so that sensors without noise are known as such soon.
@@ -23,8 +23,8 @@ const SURPRISE_MAX: f64 = 9.0;
 
 /// How many times more a sensor counts that is worse than the level than one that is better [1].
 ///
-/// One noisy sensor among four exact ones holds the level at half of its variance; counted alike it would be at a fifth. Where all
-/// are alike the level is at most five times their variance, twice their deviation.
+/// One noisy sensor among four exact ones holds the level at half of its variance; counted alike it would be at a fifth.
+/// Where all are alike the level is at most five times their variance, twice their deviation.
 const CAUTION: f64 = 4.0;
 
 /// Level of the noise of all sensors together, beside what is told of them.

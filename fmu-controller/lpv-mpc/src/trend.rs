@@ -12,19 +12,21 @@ use crate::model::Disturbance;
 
 /// Time over which the change is averaged [s].
 ///
-/// Longer, the trend comes too late (lane change with a delay that is assumed 20 ms wrong: 1.5 cm, with 0.3 s 1.9, without a trend
-/// 2.0); shorter, noise steers (root mean square of the steering increments in one unit of sensor noise on the general track:
-/// 4.8 mrad, with 0.08 s 5.1, with 0.3 s 4.4, without a trend 3.8).
+/// Longer, the trend comes too late (lane change with a delay that is assumed 20 ms wrong: 1.5 cm, with 0.3 s 1.9, without a
+/// trend 2.0); shorter, noise steers (root mean square of the steering increments in one unit of sensor noise on the general
+/// track: 4.8 mrad, with 0.08 s 5.1, with 0.3 s 4.4, without a trend 3.8). Measured with the sensors' noise taken as told and
+/// nothing learnt of the tyres.
 const MEMORY: f64 = 0.15;
 
-/// Time after which the trend has faded [s]: that of a gust's rise. With 0.2 or 1 s nothing in `cargo fmu robustness --cases` or on
-/// the general track changes by more than a tenth.
+/// Time after which the trend has faded [s]: that of a gust's rise. With 0.2 or 1 s nothing in `cargo fmu robustness --cases` or
+/// on the general track changes by more than a tenth.
 const REACH: f64 = 0.3;
 
 /// What the trend does not carry an acceleration beyond [m/s2, m/s2, rad/s2].
 ///
-/// A side wind of 37 m/s gives 2 m/s2. More is a car that slides: its tyres lose what the model believes faster and faster, and
-/// steering ahead of that loses the car (`cargo fmu robustness --case patch_unseen`: 1.8 m, without the bound 27 m).
+/// A side wind of 38 m/s gives 2 m/s2; as much yaw acceleration would take an arm of 1.8 m, seven times the default. More is a
+/// car that slides: its tyres lose what the model believes faster and faster, and steering ahead of that loses the car
+/// (`cargo fmu robustness --case patch_unseen`: 1.8 m, without the bound 27 m).
 const BOUND: f64 = 2.0;
 
 /// An unexplained acceleration and its trend.

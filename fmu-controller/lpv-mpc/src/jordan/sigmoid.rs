@@ -8,7 +8,7 @@ use std::f64::consts::{LN_2, LOG2_E};
 
 /// `1.5 * 2^52`: adding it rounds to an integer and leaves that integer in the low bits of the mantissa.
 const ROUND: f64 = 6_755_399_441_055_744.0;
-/// `2^-53` is the rounding of 1: beyond this exponent the function is 0 or 1 within it, and none can overflow.
+/// `2^-53` is the rounding of 1: seven powers beyond it the function is 0 or 1 within any rounding, and nothing overflows.
 const SATURATED: f64 = 60.0;
 
 /// Padé's approximant of `exp(x)` of degree 5 over 5 is `(even + odd) / (even - odd)`, with these coefficients of its powers
