@@ -136,7 +136,8 @@ fn difference(runs: &[Run], situation: Situation) -> String {
     });
     if situation == Situation::LaneChange {
         return format!(
-            "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}.\n"
+            "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}. Without wind its two rows \
+             are one run.\n"
         );
     }
     format!(
