@@ -81,8 +81,9 @@ fn compare_from(mut controller: Controller, inputs: impl Fn(f64) -> Inputs) {
             assert_eq!(after.output().status, Status::Optimal);
             for (name, direction) in directions() {
                 let exact = quantities(&after.along(&direction).unwrap());
-                // Central differences: third derivatives times 1e-10, and rounding of 1e-16 times a gain over 1e-5.
-                let eps = 1e-5;
+                // Central differences: third derivatives times 1e-12, rounding of 1e-16 times a gain over 1e-6, and few bends of the
+                // speed limits within.
+                let eps = 1e-6;
                 let ahead = quantities(advanced(&controller, t, &at.moved(&direction, eps)).output());
                 let behind = quantities(advanced(&controller, t, &at.moved(&direction, -eps)).output());
                 for (i, exact) in exact.into_iter().enumerate() {
