@@ -13,7 +13,7 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::discretise::{Hold, discretise};
+use crate::discretise::{Discrete, Hold, discretise, reached};
 use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
 use crate::noise::NoiseLevel;
 use crate::trend::Trend;
@@ -205,13 +205,11 @@ impl<T: Scalar> Estimator<T> {
     fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres<T>) {
         let hold = Hold::new(duration, [0.0, 0.0]);
         let input = input.map(T::from);
-        let move_on = |x: &State<T>| {
-            let at = discretise(&embed(x, &input, kappa, body, tyres, &self.trend.now), &hold);
-            (at.Phi * self.x + at.Gamma * input + at.d, at)
-        };
+        let around = |x: &State<T>| embed(x, &input, kappa, body, tyres, &self.trend.now);
         // Scheduled in the middle of the step, as the stages of the plan are.
-        let (end, _) = move_on(&self.x);
-        let (x, at) = move_on(&((self.x + end) * T::from(0.5)));
+        let end = reached(&around(&self.x), &self.x, &input, &hold);
+        let Discrete { Phi, Gamma, d } = discretise(&around(&((self.x + end) * T::from(0.5))), &hold);
+        let x = Phi * self.x + Gamma * input + d;
 
         // P <- F P F', once from the left and, since P stays symmetric, once more from the left on the transpose.
         for _ in 0..2 {
@@ -219,7 +217,7 @@ impl<T: Scalar> Estimator<T> {
                 let moved = move_column(
                     &column.fixed_rows::<NX>(0).into_owned(),
                     &column.fixed_rows::<3>(NX).into_owned(),
-                    &at.Phi,
+                    &Phi,
                     duration,
                 );
                 column.fixed_rows_mut::<NX>(0).copy_from(&moved);
