@@ -39,7 +39,7 @@ pub struct Linear<'a, T, const N_X: usize> {
 
 impl<'a, const N_X: usize> From<&'a mut Stage<N_X, NU>> for Linear<'a, f64, N_X> {
     #[inline(always)]
-    fn from(Stage { A, B, d, x_ref }: &'a mut Stage<N_X, NU>) -> Self {
+    fn from(Stage { A, B, d, x_ref, .. }: &'a mut Stage<N_X, NU>) -> Self {
         Self { A, B, d, x_ref }
     }
 }

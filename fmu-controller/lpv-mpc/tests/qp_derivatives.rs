@@ -57,6 +57,7 @@ fn perturbed<const NX: usize>(problem: &Problem<NX, 2>, change: &Perturbation<NX
         stage.B += d.B * step;
         stage.d += d.d * step;
         stage.x_ref += d.x_ref * step;
+        stage.du_ref += d.du_ref * step;
     }
     moved
 }
@@ -77,6 +78,7 @@ fn tangent_matches_differences<const NX: usize>() {
                     B: SMatrix::from_fn(|_, _| number()),
                     d: SVector::from_fn(|_, _| number()),
                     x_ref: SVector::from_fn(|_, _| number()),
+                    du_ref: SVector::from_fn(|_, _| number()),
                 })
                 .collect(),
             x_0: SVector::from_fn(|_, _| number()),

@@ -42,7 +42,7 @@ fn one_free_stage_matches_the_normal_equations() {
     let R = SMatrix::<f64, 2, 2>::from_diagonal(&problem.r);
     let error = stage.A * problem.x_0 + stage.d - stage.x_ref;
     let hessian = stage.B.transpose() * W * stage.B + R;
-    let u = hessian.lu().solve(&(R * problem.u_prev - stage.B.transpose() * W * error)).unwrap();
+    let u = hessian.lu().solve(&(R * (problem.u_prev + stage.du_ref) - stage.B.transpose() * W * error)).unwrap();
     let solution = solve(&problem);
     assert_eq!(solution.outcome, Outcome::Optimal);
     // Two direct solutions of a system of two: only rounding differs.
@@ -81,6 +81,7 @@ fn plan_of_the_mirrored_problem_is_mirrored() {
     for stage in &mut mirrored.stages {
         stage.d = -stage.d;
         stage.x_ref = -stage.x_ref;
+        stage.du_ref = -stage.du_ref;
     }
     let (one, other) = (solve(&problem), solve(&mirrored));
     assert!(one.mu_u.iter().chain(&one.mu_du).any(|mu| mu.amax() > 0.0), "the case must have active bounds");

@@ -124,7 +124,7 @@ impl Law for LinearMpc {
         for i in 0..self.problem.stages.len() {
             let (before, after) = (turn(i), turn(i + 1));
             self.problem.stages[i] =
-                Stage { A: phi, B: gamma, d: bend * (0.5 * (before + after)), x_ref: self.steady(v, after) };
+                Stage { A: phi, B: gamma, d: bend * (0.5 * (before + after)), x_ref: self.steady(v, after), ..Stage::default() };
         }
         self.solver.shift();
         self.solver.solve(&self.problem, &mut self.solution);

@@ -140,7 +140,7 @@ impl PaperMpc {
             if !(self.printed.terminal && i == last) {
                 x_ref[V_X] = seen.v_x_ref[i + 1];
             }
-            self.problem.stages[i] = Stage { A: transition, B: response, d: SVector::zeros(), x_ref };
+            self.problem.stages[i] = Stage { A: transition, B: response, x_ref, ..Stage::default() };
         }
         self.solver.shift();
         self.solver.solve(&self.problem, &mut self.solution);

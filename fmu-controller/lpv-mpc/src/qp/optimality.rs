@@ -1,6 +1,6 @@
 //! Conditions of optimality, evaluated from a plan and its multipliers alone: the same measure for every solver.
 
-use super::{Problem, Solution};
+use super::{Problem, Solution, Stage};
 use nalgebra::SVector;
 
 /// Sets the costates of a plan: λ_N = 2 W_N (x_N - x_ref_N) + soft term, λ_i = A_i' λ_(i+1) + 2 W_i (x_i - x_ref_i) + soft term.
@@ -32,14 +32,15 @@ pub fn gradient<const NX: usize, const NU: usize>(
     i: usize,
 ) -> (SVector<f64, NU>, SVector<f64, NU>) {
     let N = problem.stages.len();
-    let B = &problem.stages[i].B;
+    let Stage { B, du_ref, .. } = &problem.stages[i];
+    let du_ref_next = problem.stages.get(i + 1).map_or_else(SVector::zeros, |next| next.du_ref);
     let u = &solution.u;
     let u_before = if i == 0 { problem.u_prev_clamped() } else { u[i - 1] };
     let mut gradient = SVector::zeros();
     let mut scale = SVector::zeros();
     for j in 0..NU {
-        let du = 2.0 * problem.r[j] * (u[i][j] - u_before[j]);
-        let du_next = if i + 1 < N { 2.0 * problem.r[j] * (u[i + 1][j] - u[i][j]) } else { 0.0 };
+        let du = 2.0 * problem.r[j] * (u[i][j] - u_before[j] - du_ref[j]);
+        let du_next = if i + 1 < N { 2.0 * problem.r[j] * (u[i + 1][j] - u[i][j] - du_ref_next[j]) } else { 0.0 };
         let mut along_dynamics = 0.0;
         let mut magnitude = du.abs() + du_next.abs();
         let mut curvature = 2.0 * problem.r[j];

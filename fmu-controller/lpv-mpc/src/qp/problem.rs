@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Prediction from one sample to the next, x⁺ = A x + B u + d, and what the next state should be.
+/// Prediction from one sample to the next, x⁺ = A x + B u + d, what the next state should be, and how the input should change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stage<const NX: usize, const NU: usize> {
     /// System matrix.
@@ -14,17 +14,25 @@ pub struct Stage<const NX: usize, const NU: usize> {
     pub d: SVector<f64, NX>,
     /// Reference of the state that this stage leads to.
     pub x_ref: SVector<f64, NX>,
+    /// Reference of the input's increment.
+    pub du_ref: SVector<f64, NU>,
 }
 
 impl<const NX: usize, const NU: usize> Default for Stage<NX, NU> {
     fn default() -> Self {
-        Self { A: SMatrix::zeros(), B: SMatrix::zeros(), d: SVector::zeros(), x_ref: SVector::zeros() }
+        Self {
+            A: SMatrix::zeros(),
+            B: SMatrix::zeros(),
+            d: SVector::zeros(),
+            x_ref: SVector::zeros(),
+            du_ref: SVector::zeros(),
+        }
     }
 }
 
 impl<const NX: usize, const NU: usize> Stage<NX, NU> {
     fn is_finite(&self) -> bool {
-        let vectors = self.d.iter().chain(self.x_ref.iter());
+        let vectors = self.d.iter().chain(&self.x_ref).chain(&self.du_ref);
         self.A.iter().chain(self.B.iter()).chain(vectors).all(|value| value.is_finite())
     }
 }
@@ -33,7 +41,7 @@ impl<const NX: usize, const NU: usize> Stage<NX, NU> {
 ///
 /// ```text
 /// minimise    sum (i = 1..N)    (x_i - x_ref_i)' W_i (x_i - x_ref_i)  +  soft e_i^2
-///           + sum (i = 0..N-1)  du_i' diag(r) du_i                       (nothing is halved)
+///           + sum (i = 0..N-1)  (du_i - du_ref_i)' diag(r) (du_i - du_ref_i)      (nothing is halved)
 /// subject to  x_(i+1) = A_i x_i + B_i u_i + d_i
 ///             u_min <= u_i <= u_max,  |du_i| <= du_max,  |x_i[soft_state]| <= soft_bound + e_i
 /// ```
@@ -153,7 +161,7 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
             } else {
                 error.component_mul(&error).dot(&self.q)
             };
-            let du = u - u_prev;
+            let du = u - u_prev - stage.du_ref;
             u_prev = u;
             cost += du.component_mul(&du).dot(&self.r);
             if self.soft > 0.0 {

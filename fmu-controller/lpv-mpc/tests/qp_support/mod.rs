@@ -48,6 +48,7 @@ pub fn random_problem<const NX: usize, const NU: usize>(stress: &Stress) -> Prob
             B: B.map(|b| b * (1.0 + drift * uniform(random, -1.0, 1.0))),
             d: SVector::from_fn(|_, _| uniform(random, -0.1, 0.1)),
             x_ref: SVector::from_fn(|_, _| stress.demand * uniform(random, -1.0, 1.0)),
+            du_ref: SVector::zeros(),
         };
     }
     let decades = stress.decades;
@@ -90,6 +91,9 @@ pub fn random_problem<const NX: usize, const NU: usize>(stress: &Stress) -> Prob
     problem.soft_state = random.random_range(0..NX);
     problem.soft_bound = uniform(random, 0.0, 1.0) * stress.demand;
     problem.soft = if uniform(random, 0.0, 1.0) < 0.3 { 0.0 } else { 10f64.powf(uniform(random, 0.0, decades)) };
+    for stage in &mut problem.stages {
+        stage.du_ref = SVector::from_fn(|_, _| 0.1 * stress.demand * uniform(random, -1.0, 1.0));
+    }
     problem
 }
 

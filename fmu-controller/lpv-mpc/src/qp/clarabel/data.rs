@@ -89,10 +89,11 @@ impl Data {
         let weight = 2.0 * problem.r[j] * su * su * cost;
         if i > 0 {
             self.P.push((i - 1) * columns + j, -weight);
-            self.q.push(0.0);
-        } else {
-            self.q.push(-2.0 * problem.r[j] * su * cost * problem.u_prev_clamped()[j]);
         }
+        // What is asked of the increment from the input before, and of the next one from it.
+        let du_ref = |i: usize| problem.stages.get(i).map_or(0.0, |stage| stage.du_ref[j]);
+        let before = if i > 0 { 0.0 } else { problem.u_prev_clamped()[j] };
+        self.q.push(2.0 * problem.r[j] * su * cost * (du_ref(i + 1) - du_ref(i) - before));
         // Every increment but the last one's successor touches the input twice.
         self.P.push(i * columns + j, if i + 1 < N { 2.0 * weight } else { weight });
         self.P.end_column();

@@ -32,6 +32,25 @@ pub(super) struct Factor<const NX: usize, const NU: usize> {
     Sd: [f64; NX],
     /// T' d
     Td: [f64; NU],
+    /// R du_ref
+    pull: [f64; NU],
+}
+
+/// What makes a stage affine instead of linear.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Affine<'a, const NX: usize, const NU: usize> {
+    pub d: &'a [f64; NX],
+    pub du_ref: &'a [f64; NU],
+}
+
+impl<'a, const NX: usize, const NU: usize> Affine<'a, NX, NU> {
+    /// Nothing: that of differences.
+    pub(super) const ZERO: Self = Self { d: &[0.0; NX], du_ref: &[0.0; NU] };
+
+    /// The stage's own.
+    pub(super) fn of(stage: &'a Stage<NX, NU>) -> Self {
+        Self { d: &stage.d.data.0[0], du_ref: &stage.du_ref.data.0[0] }
+    }
 }
 
 impl<const NX: usize, const NU: usize> Value<NX, NU> {
@@ -58,8 +77,14 @@ impl<const NX: usize, const NU: usize> Value<NX, NU> {
 }
 
 impl<const NX: usize, const NU: usize> Factor<NX, NU> {
-    pub(super) const ZERO: Self =
-        Self { G: [[0.0; NU]; NX], H: [[0.0; NU]; NU], inverse: [[0.0; NU]; NU], Sd: [0.0; NX], Td: [0.0; NU] };
+    pub(super) const ZERO: Self = Self {
+        G: [[0.0; NU]; NX],
+        H: [[0.0; NU]; NU],
+        inverse: [[0.0; NU]; NU],
+        Sd: [0.0; NX],
+        Td: [0.0; NU],
+        pull: [0.0; NU],
+    };
 }
 
 /// `y += a x`, the shape that the compiler turns into packed instructions.
@@ -84,14 +109,15 @@ pub(super) fn transpose<const R: usize, const C: usize>(columns: &[[f64; R]; C])
 /// Minimises over the input of a stage: from the value of what follows to the policy and the value in front. `before` comes in
 /// with what the state in front costs by itself: written before the step instead of after it, because the next step reads whole
 /// rows, and would wait for single elements written just before.
-/// The affine term of the prediction is `d` instead of the stage's own, for recursions over differences.
+/// The affine term of the prediction and the reference of the increment are `affine` instead of the stage's own, for recursions
+/// over differences.
 ///
 /// An input that is held at a bound keeps the form of the policy: a constant, or the previous input plus a constant.
 /// Returns `None` when the curvature of a free input is not positive, which rounding can bring about.
 #[inline(always)]
 pub(super) fn step<const NX: usize, const NU: usize>(
     stage: &Stage<NX, NU>,
-    d: &[f64; NX],
+    affine: Affine<'_, NX, NU>,
     after: &Value<NX, NU>,
     r: &[f64; NU],
     hold: &[Hold; NU],
@@ -100,6 +126,7 @@ pub(super) fn step<const NX: usize, const NU: usize>(
 ) -> Option<Factor<NX, NU>> {
     let A = &stage.A.data.0;
     let B = &stage.B.data.0;
+    let d = affine.d;
     let A_rows = transpose(A);
     let B_rows = transpose(B);
 
@@ -141,7 +168,8 @@ pub(super) fn step<const NX: usize, const NU: usize>(
         H[j][j] += r[j];
     }
     let inverse = invert(&H, hold)?;
-    let factor = Factor { G, H, inverse, Sd, Td };
+    let pull = std::array::from_fn(|j| r[j] * affine.du_ref[j]);
+    let factor = Factor { G, H, inverse, Sd, Td, pull };
     policy_gains(&factor, r, hold, policy);
     linear_step(stage, &factor, r, hold, (&after.s, &after.t), policy, (&mut before.s, &mut before.t));
 
@@ -221,7 +249,7 @@ pub(super) fn linear_step<const NX: usize, const NU: usize>(
     let A_rows = transpose(&stage.A.data.0);
     let B_rows = transpose(&stage.B.data.0);
     let G_rows = transpose(&factor.G);
-    // y = S d + s, g = B' y + T' d + t.
+    // y = S d + s, g = B' y + T' d + t - R du_ref.
     let mut y = factor.Sd;
     let mut g = factor.Td;
     for k in 0..NX {
@@ -229,7 +257,7 @@ pub(super) fn linear_step<const NX: usize, const NU: usize>(
         axpy(y[k], &B_rows[k], &mut g);
     }
     for j in 0..NU {
-        g[j] += t[j];
+        g[j] += t[j] - factor.pull[j];
     }
     policy.k = [0.0; NU];
     for j in 0..NU {
@@ -244,7 +272,7 @@ pub(super) fn linear_step<const NX: usize, const NU: usize>(
     }
     for j in 0..NU {
         axpy(policy.k[j], &G_rows[j], s_before);
-        t_before[j] = -r[j] * policy.k[j];
+        t_before[j] = factor.pull[j] - r[j] * policy.k[j];
         if let Hold::Linked(_) = hold[j] {
             t_before[j] += g[j];
             for l in 0..NU {

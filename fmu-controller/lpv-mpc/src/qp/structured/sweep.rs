@@ -2,7 +2,7 @@
 
 use super::super::optimality;
 use super::active::{self, Active};
-use super::riccati::{self, Value};
+use super::riccati::{self, Affine, Value};
 use super::{Hold, Problem, Solution, Structured, WRONG_SIGN};
 use std::mem;
 
@@ -34,7 +34,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 (hold[j], demand[j]) = active::hold(problem, j, self.active[i][j], demand[j]);
             }
             let stage = &problem.stages[i];
-            if riccati::step(stage, &stage.d.data.0[0], value, r, &hold, &mut self.policies[i], before).is_none() {
+            if riccati::step(stage, Affine::of(stage), value, r, &hold, &mut self.policies[i], before).is_none() {
                 return false;
             }
             mem::swap(&mut value, &mut before);

@@ -1,7 +1,7 @@
 //! Derivative of the solution with respect to the problem's data.
 
 use super::policy::Policy;
-use super::riccati::{self, Value};
+use super::riccati::{self, Affine, Value};
 use super::sweep::terminal;
 use super::{Hold, Problem, Solution, Stage, Structured, active, rollout};
 use nalgebra::SVector;
@@ -83,10 +83,9 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 value.t[j] += slope_u[j];
             }
             stages[i].d = change.A * solution.x[i] + change.B * solution.u[i] + change.d;
-            let mut before = Value::ZERO;
-            if riccati::step(&stages[i], &stages[i].d.data.0[0], &value, r, &hold, &mut policies[i], &mut before)
-                .is_none()
-            {
+            stages[i].du_ref = change.du_ref;
+            let (stage, mut before) = (&stages[i], Value::ZERO);
+            if riccati::step(stage, Affine::of(stage), &value, r, &hold, &mut policies[i], &mut before).is_none() {
                 // The same recursion succeeded when the problem was solved.
                 break;
             }

@@ -2,7 +2,7 @@
 
 use super::super::active::Hold;
 use super::super::policy::Policy;
-use super::super::riccati::{self, Value, axpy, transpose};
+use super::super::riccati::{self, Affine, Value, axpy, transpose};
 use super::super::{rollout, sweep};
 use super::rows::{Bounds, Quantity, Row};
 
@@ -64,8 +64,10 @@ impl<const NX: usize, const NU: usize> Response<NX, NU> {
                 before.add_squares(&problem.q.data.0[0], &problem.stages[i - 1].x_ref.data.0[0]);
             }
             let policy = &mut self.policies[i];
-            let (d, r) = (&stage.d.data.0[0], &problem.r.data.0[0]);
-            let Some(factor) = riccati::step(stage, d, &value, r, &hold, policy, &mut before) else { return false };
+            let (affine, r) = (Affine::of(stage), &problem.r.data.0[0]);
+            let Some(factor) = riccati::step(stage, affine, &value, r, &hold, policy, &mut before) else {
+                return false;
+            };
             self.gains[i] = Gains {
                 A_rows: transpose(&stage.A.data.0),
                 B_rows: transpose(&stage.B.data.0),

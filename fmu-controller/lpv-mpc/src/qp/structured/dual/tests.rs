@@ -17,6 +17,7 @@ fn problem(random: &mut Pcg64Mcg) -> Problem<2, 1> {
         stage.B = Vector2::new(0.5, 1.0);
         stage.d = Vector2::new(0.0, random.random_range(-0.3..0.3));
         stage.x_ref = Vector2::new(random.random_range(-3.0..3.0), 0.0);
+        stage.du_ref = Vector1::new(random.random_range(-0.5..0.5));
     }
     problem.x_0 = Vector2::new(random.random_range(-2.0..2.0), random.random_range(-2.0..2.0));
     problem.q = Vector2::new(1.0, random.random_range(0.0..0.3));
@@ -68,6 +69,7 @@ fn cheapest(problem: &Problem<2, 1>) -> (f64, Plan) {
         let mut hessian = difference.tr_mul(&difference) * problem.r[0];
         let mut slope = DVector::zeros(N);
         slope[0] = -problem.r[0] * problem.u_prev[0];
+        slope -= difference.tr_mul(&DVector::from_fn(N, |i, _| problem.stages[i].du_ref[0])) * problem.r[0];
         for i in 0..N {
             let row = |k: usize| DVector::from_fn(N, |j, _| columns[j][i + 1][k]);
             let mut add = |k: usize, weight: f64, target: f64| {

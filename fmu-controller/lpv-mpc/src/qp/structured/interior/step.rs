@@ -2,7 +2,7 @@
 
 use super::super::Problem;
 use super::super::active::Hold;
-use super::super::riccati::{self, Value};
+use super::super::riccati::{self, Affine, Value};
 use super::super::rollout;
 use super::{Interior, Row};
 use nalgebra::SVector;
@@ -53,7 +53,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                     continue;
                 }
                 let p = if i == 0 { u_prev[j] } else { self.u[i - 1][j] };
-                slope[j] = r[j] * (self.u[i][j] - p);
+                slope[j] = r[j] * (self.u[i][j] - p - problem.stages[i].du_ref[j]);
                 for (m, row) in self.rows[i][j].iter_mut().enumerate() {
                     if row.z > 0.0 {
                         if factorise {
@@ -76,7 +76,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
             let mut before = self.costs(problem, i);
             let policy = &mut self.policies[i];
             if factorise {
-                match riccati::step(stage, &[0.0; NX], &value, &r, &hold, policy, &mut before) {
+                match riccati::step(stage, Affine::ZERO, &value, &r, &hold, policy, &mut before) {
                     Some(factor) => self.factors[i] = factor,
                     None => return false,
                 }
