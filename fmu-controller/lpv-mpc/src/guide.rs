@@ -122,6 +122,11 @@ impl<'a, T: Scalar> Guide<'a, T> {
         self.time
     }
 
+    /// Acceleration that the model cannot explain, in the middle of the stage before the next one.
+    pub fn disturbance_before(&self) -> Disturbance<T> {
+        self.course.before()
+    }
+
     /// The same, no faster than `pace` [m/s].
     pub fn no_faster_than(self, pace: f64) -> Self {
         Self { pace, ..self }

@@ -34,6 +34,7 @@ pub mod controller;
 pub mod discretise;
 mod error;
 pub mod estimator;
+mod feedforward;
 mod friction;
 mod grip;
 mod guide;

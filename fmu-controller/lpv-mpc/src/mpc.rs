@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use crate::Parameters;
 use crate::caution::caution;
 use crate::discretise::Hold;
+use crate::feedforward::{FeedForward, Past};
 use crate::guide::Guide;
-use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state};
+use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state, vehicle_part};
 use crate::lanes::{Work, widest};
 use crate::latency::Predicted;
 use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
@@ -77,6 +78,11 @@ pub struct Mpc<const N_X: usize> {
     r_delta: f64,
     /// Fastest speed that was soon wanted when the last plan was made [m/s].
     fastest: f64,
+    /// Increments of the steering that the path asks for, and the stage before the plan's first one.
+    increments: Vec<f64>, // N
+    pub(crate) past: Option<Past>,
+    /// The same for the next sample.
+    next: Option<Past>,
     /// The plan that is executed.
     pub plan: Plan<N_X>,
     /// Trajectory around which the last problem was linearised, and the tyres of its stages.
@@ -102,6 +108,9 @@ impl<const N_X: usize> Mpc<N_X> {
             steering_step: p.delta_rate_max * p.t_s,
             r_delta: p.r_delta,
             fastest: f64::INFINITY,
+            increments: vec![0.0; p.horizon],
+            past: None,
+            next: None,
             plan: Plan::none(p.horizon),
             schedule: Plan::none(p.horizon),
             tyres: vec![p.nominal_tyres(); p.horizon],
@@ -162,6 +171,7 @@ impl<const N_X: usize> Mpc<N_X> {
         self.problem.r[DELTA] = self.r_delta * caution(self.plan.x[1][V_X], guide.latency());
         let speed = self.plan.x[self.plan.x.len() - 1][V_X];
         self.terminal.weigh(&mut self.problem, speed, &tyres.nominal(), hold, body);
+        self.past = if continues { self.next } else { None };
         let passes = if continues { 1 } else { FIRST_PASSES };
         for _ in 0..passes {
             self.plan.x[0] = self.problem.x_0;
@@ -224,6 +234,8 @@ impl<const N_X: usize> Mpc<N_X> {
         tyres.restart();
         self.fastest = 0.0;
         self.schedule.take(&self.plan);
+        let from = vehicle_part(&self.problem.x_0);
+        let mut ideal = FeedForward::new(body, hold.step, &from, self.past, guide.disturbance_before());
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
             let path = guide.advance(|kappa| at.progress(kappa));
@@ -232,11 +244,17 @@ impl<const N_X: usize> Mpc<N_X> {
                 self.fastest = self.fastest.max(path.wanted);
             }
             linearise(&at, &path, &self.tyres[i], &around, stage.into());
+            self.increments[i] = ideal.advance(at.x[V_X], &path, &self.tyres[i]);
             if let Some(recovery) = recovery {
                 let (e_y, e_psi) = recovery.at(i, path.v_x);
                 stage.x_ref[E_Y] += e_y;
                 stage.x_ref[E_PSI] += e_psi;
             }
+        }
+        self.next = ideal.executable(&mut self.increments, hold.decay[DELTA], self.problem.du_max[DELTA]);
+        for (stage, increment) in self.problem.stages.iter_mut().zip(&self.increments) {
+            // The way back from far off the path is another one.
+            stage.du_ref[DELTA] = if recovery.is_some() { 0.0 } else { *increment };
         }
     }
 

@@ -13,11 +13,12 @@ use serde::{Deserialize, Serialize};
 use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
+use crate::feedforward::FeedForward;
 use crate::guide::Guide;
 use crate::horizon::{Linear, Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_Y};
+use crate::model::{A_X, Body, DELTA, Disturbance, E_Y, Input, State, Tyres, V_X, V_Y};
 use crate::modes::Estimation;
 use crate::mpc::{Mpc, TyreModel};
 use crate::qp::{Perturbation, Stage};
@@ -110,6 +111,8 @@ pub(crate) fn along<const N_X: usize>(
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);
     change.x_0 = x_0.map(|x| x.eps);
+    let mut ideal = FeedForward::new(body, hold.step, &at.x, mpc.past, guide.disturbance_before());
+    let mut increments = Vec::with_capacity(change.stages.len());
     for (i, stage) in change.stages.iter_mut().enumerate() {
         let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
         let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
@@ -122,7 +125,18 @@ pub(crate) fn along<const N_X: usize>(
         let (mut d, mut x_ref) = (SVector::zeros(), SVector::zeros());
         let linear = Linear { A: &mut A, B: &mut B, d: &mut d, x_ref: &mut x_ref };
         linearise::<Dual64, N_X>(&scheduled, &path, &tyres, &around, linear);
-        *stage = Stage { A: A.map(|a| a.eps), B: B.map(|b| b.eps), d: d.map(|d| d.eps), x_ref: x_ref.map(|x| x.eps) };
+        increments.push(ideal.advance(scheduled.x[V_X], &path, &tyres));
+        *stage = Stage {
+            A: A.map(|a| a.eps),
+            B: B.map(|b| b.eps),
+            d: d.map(|d| d.eps),
+            x_ref: x_ref.map(|x| x.eps),
+            du_ref: SVector::zeros(),
+        };
+    }
+    ideal.executable(&mut increments, hold.decay[DELTA], mpc.problem.du_max[DELTA]);
+    for (stage, increment) in change.stages.iter_mut().zip(&increments) {
+        stage.du_ref[DELTA] = increment.eps;
     }
     let tangent = mpc.structured.tangent(&mpc.problem, &mpc.solution, &change);
 

@@ -92,6 +92,11 @@ pub struct Course<T: Scalar> {
 }
 
 impl<T: Scalar> Course<T> {
+    /// The acceleration in the middle of the stage before the next one.
+    pub fn before(&self) -> Disturbance<T> {
+        self.now + self.lead * T::from(1.0 - self.left / self.decay)
+    }
+
     /// The acceleration in the middle of the next stage.
     pub fn advance(&mut self) -> Disturbance<T> {
         let expected = self.now + self.lead * T::from(1.0 - self.left);
