@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::Parameters;
 use crate::caution::caution;
 use crate::discretise::Hold;
-use crate::feedforward::{FeedForward, Past};
+use crate::feedforward::{Before, FeedForward, Past};
 use crate::guide::Guide;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state, vehicle_part};
 use crate::lanes::{Work, widest};
@@ -235,7 +235,10 @@ impl<const N_X: usize> Mpc<N_X> {
         self.fastest = 0.0;
         self.schedule.take(&self.plan);
         let from = vehicle_part(&self.problem.x_0);
-        let mut ideal = FeedForward::new(body, hold.step, &from, self.past, guide.disturbance_before());
+        // In the middle of the stage before, as the plan goes on from there.
+        let v_x = 1.5 * self.schedule.x[0][V_X] - 0.5 * self.schedule.x[1][V_X];
+        let before = Before { v_x, disturbance: guide.disturbance_before() };
+        let mut ideal = FeedForward::new(body, hold.step, &from, self.past, before);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
             let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
             let path = guide.advance(|kappa| at.progress(kappa));

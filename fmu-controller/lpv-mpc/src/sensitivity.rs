@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::adaptation::Adapter;
 use crate::discretise::Hold;
 use crate::estimator::Estimator;
-use crate::feedforward::FeedForward;
+use crate::feedforward::{Before, FeedForward};
 use crate::guide::Guide;
 use crate::horizon::{Linear, Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
@@ -111,7 +111,9 @@ pub(crate) fn along<const N_X: usize>(
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);
     change.x_0 = x_0.map(|x| x.eps);
-    let mut ideal = FeedForward::new(body, hold.step, &at.x, mpc.past, guide.disturbance_before());
+    let before =
+        Before { v_x: at.x[V_X] * 1.5 - mpc.schedule.x[1][V_X] * 0.5, disturbance: guide.disturbance_before() };
+    let mut ideal = FeedForward::new(body, hold.step, &at.x, mpc.past, before);
     let mut increments = Vec::with_capacity(change.stages.len());
     for (i, stage) in change.stages.iter_mut().enumerate() {
         let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
