@@ -54,7 +54,7 @@ const CONFIRMING_SWEEPS: u32 = 3;
 /// longer horizon, and each is dearer; at 45, `N = 15`, both cost the same on recorded problems.
 const DENSE_ROWS_MAX: usize = 45;
 /// Scaled multiplier of the wrong sign that is rounding.
-const WRONG_SIGN: f64 = 1e-9;
+const WRONG_SIGN: f64 = 1e-10;
 /// Scaled stationarity up to which a plan is called optimal.
 const STATIONARY: f64 = 1e-8;
 
