@@ -78,10 +78,10 @@ pub struct Mpc<const N_X: usize> {
     r_delta: f64,
     /// Fastest speed that was soon wanted when the last plan was made [m/s].
     fastest: f64,
-    /// Increments of the steering that the path asks for, and the stage before the plan's first one.
+    /// Increments of the steering that the path asks for [rad].
     increments: Vec<f64>, // N
+    /// The stage before the plan's first one, for this sample and for the next.
     pub(crate) past: Option<Past>,
-    /// The same for the next sample.
     next: Option<Past>,
     /// The plan that is executed.
     pub plan: Plan<N_X>,
@@ -255,9 +255,10 @@ impl<const N_X: usize> Mpc<N_X> {
             }
         }
         self.next = ideal.executable(&mut self.increments, hold.decay[DELTA], self.problem.du_max[DELTA]);
+        // The way back from far off the path is another one.
+        let share = recovery.map_or(1.0, |recovery| recovery.path);
         for (stage, increment) in self.problem.stages.iter_mut().zip(&self.increments) {
-            // The way back from far off the path is another one.
-            stage.du_ref[DELTA] = if recovery.is_some() { 0.0 } else { *increment };
+            stage.du_ref[DELTA] = share * increment;
         }
     }
 

@@ -40,6 +40,8 @@ const PACE_MIN: f64 = 3.0;
 pub struct Recovery {
     /// Lateral error [m] and its rate [m/s].
     way: [(f64, f64); HORIZON_MAX],
+    /// How far the path itself still counts, from 1 beside it to 0 far off [1].
+    pub path: f64,
     /// Speed that is low enough for the way back [m/s].
     pub pace: f64,
     /// By how much the soft bound gives way [m].
@@ -79,7 +81,7 @@ impl Recovery {
             *slot = (weight * e, weight * rate);
             room = room.max(weight * e.abs());
         }
-        Some(Self { way, pace: (turn_back / course).max(PACE_MIN) / weight, room })
+        Some(Self { way, path: 1.0 - weight, pace: (turn_back / course).max(PACE_MIN) / weight, room })
     }
 
     /// Lateral error [m] and heading error [rad] to add to the reference at the end of stage `i`, driven at `v_x` [m/s].

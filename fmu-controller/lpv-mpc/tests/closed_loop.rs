@@ -110,8 +110,9 @@ fn straight(_: f64) -> f64 {
 fn a_known_car_stays_on_the_path_at_every_communication_step() {
     for h in [0.001, 0.011, 0.033] {
         let worst = Loop { h, ..Loop::new(Parameters::default(), slalom) }.worst_e_y(10.0, 0.0);
-        // The steering increments cost something, so the path is not followed exactly.
-        assert!(worst < 0.015, "step {h} s: {worst} m");
+        // The slalom begins with its full rate, which the ideal car does not know beforehand: 1.2 mm at the longest step. Weighed
+        // against zero the steering increments would cost 10 mm.
+        assert!(worst < 0.002, "step {h} s: {worst} m");
     }
 }
 
@@ -290,6 +291,35 @@ fn without_a_road_the_plan_is_executed_to_its_end() {
     assert_eq!(seen[0].0, Status::PreviousPlan);
     assert_eq!(seen[8].0, Status::PreviousPlan);
     assert_eq!(seen[9].0, Status::SafeStop);
+}
+
+#[test]
+fn one_spoiled_sample_spoils_no_other() {
+    let spoils: [fn(&mut Inputs); 5] = [
+        |inputs| inputs.kappa_ref[0] = f64::NAN,
+        |inputs| inputs.kappa_ref[1] = f64::INFINITY,
+        |inputs| inputs.v_x_ref[0] = f64::NAN,
+        |inputs| inputs.v_x = f64::NAN,
+        |inputs| inputs.v_y = f64::INFINITY,
+    ];
+    for (i, spoil) in spoils.into_iter().enumerate() {
+        for estimation in [Estimation::Measured, Estimation::Kalman] {
+            let parameters = Parameters { estimation, ..Parameters::default() };
+            let road = Loop::new(parameters.clone(), slalom);
+            let mut controller = Controller::new(parameters, 0.0).unwrap();
+            let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
+            for k in 0..10 {
+                let t = k as f64 * 0.033;
+                let mut inputs = road.inputs(t, &x);
+                if k == 5 {
+                    spoil(&mut inputs);
+                }
+                controller.advance(t, 0.033, &inputs).unwrap();
+                let status = controller.output().status;
+                assert!(status == Status::Optimal || k == 5, "{i}, {estimation:?}, sample {k}: {status:?}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -123,8 +123,13 @@ impl Law for LinearMpc {
         let turn = |i: usize| path_yaw_rate(seen, latency / t_s + i as f64);
         for i in 0..self.problem.stages.len() {
             let (before, after) = (turn(i), turn(i + 1));
-            self.problem.stages[i] =
-                Stage { A: phi, B: gamma, d: bend * (0.5 * (before + after)), x_ref: self.steady(v, after), ..Stage::default() };
+            self.problem.stages[i] = Stage {
+                A: phi,
+                B: gamma,
+                d: bend * (0.5 * (before + after)),
+                x_ref: self.steady(v, after),
+                ..Stage::default()
+            };
         }
         self.solver.shift();
         self.solver.solve(&self.problem, &mut self.solution);
