@@ -6,6 +6,9 @@ once: no time passes while the plan is made. No controller in a car can have any
 
 Of the wind it foresees what is going to blow, or it feels what blows now and expects that to go on, or it is told nothing.
 
+Its increments of steering are weighed against zero, the textbook cost that the paper has. The runs named ideal weigh them, as
+the controller does, against those of a car that follows the path exactly.
+
 The runs are stored in nmpc.zip beside this script, one table for each, with the weights that they were made with:
 
     cargo fmu pack
@@ -63,14 +66,18 @@ def calm(_time, _s):
     return 0.0
 
 
-# Road, whether the wind is an input of the plant, its speed over time and place, and what the planner knows of it.
+# Road, whether the wind is an input of the plant, its speed over time and place, what the planner knows of it, and what its
+# increments of steering are weighed against.
 RUNS = {
-    "lane_change": ("double_lane_change", False, calm, "foreseen"),
-    "lane_change_wind": ("double_lane_change", True, lane_change_wind, "foreseen"),
-    "lane_change_wind_felt": ("double_lane_change", True, lane_change_wind, "felt"),
-    "general": ("general", False, general_wind, "foreseen"),
-    "general_felt": ("general", False, general_wind, "felt"),
-    "general_untold": ("general", False, general_wind, "untold"),
+    "lane_change": ("double_lane_change", False, calm, "foreseen", "zero"),
+    "lane_change_ideal": ("double_lane_change", False, calm, "foreseen", "ideal car"),
+    "lane_change_wind": ("double_lane_change", True, lane_change_wind, "foreseen", "zero"),
+    "lane_change_wind_felt": ("double_lane_change", True, lane_change_wind, "felt", "zero"),
+    "lane_change_wind_felt_ideal": ("double_lane_change", True, lane_change_wind, "felt", "ideal car"),
+    "general": ("general", False, general_wind, "foreseen", "zero"),
+    "general_felt": ("general", False, general_wind, "felt", "zero"),
+    "general_felt_ideal": ("general", False, general_wind, "felt", "ideal car"),
+    "general_untold": ("general", False, general_wind, "untold", "zero"),
 }
 
 
@@ -106,22 +113,34 @@ class Plant:
         return {name: float(self.starts[name]) for name in names}
 
 
+def peaks(body):
+    """Largest lateral forces of the front and of the rear axle [N]."""
+    per_metre = body["mu"] * body["m"] * body["g"] / (body["l_f"] + body["l_r"])
+    return per_metre * body["l_r"], per_metre * body["l_f"]
+
+
+def tyre(alpha, peak):
+    """Lateral force of an axle [N]."""
+    return peak * ca.sin(TYRE_C * ca.atan(TYRE_B * alpha))
+
+
+def air(body, v_x, v_y, psi, wind):
+    """Forces of the air along the car and across it [N]."""
+    p = body
+    air_x, air_y = -wind * ca.cos(psi) - v_x, wind * ca.sin(psi) - v_y
+    speed = ca.sqrt(air_x**2 + air_y**2 + 1e-12)
+    return 0.5 * p["rho"] * p["c_d"] * p["area"] * speed * air_x, 0.5 * p["rho"] * p["c_s"] * p["area_side"] * speed * air_y
+
+
 def derivative(body, x, u, kappa, wind):
     """The plant's equations above walking speed, all extras off; the wind blows against the first heading of the road."""
     p = body
     v_x, v_y, yaw_rate, e_y, e_psi, psi = ca.vertsplit(x)
     delta, a_x = ca.vertsplit(u)
-    per_metre = p["mu"] * p["m"] * p["g"] / (p["l_f"] + p["l_r"])
-
-    def force(alpha, peak):
-        return peak * ca.sin(TYRE_C * ca.atan(TYRE_B * alpha))
-
-    f_f = force(delta - ca.atan((v_y + p["l_f"] * yaw_rate) / v_x), per_metre * p["l_r"])
-    f_r = force(-ca.atan((v_y - p["l_r"] * yaw_rate) / v_x), per_metre * p["l_f"])
-    air_x, air_y = -wind * ca.cos(psi) - v_x, wind * ca.sin(psi) - v_y
-    speed = ca.sqrt(air_x**2 + air_y**2 + 1e-12)
-    drag = 0.5 * p["rho"] * p["c_d"] * p["area"] * speed * air_x
-    side = 0.5 * p["rho"] * p["c_s"] * p["area_side"] * speed * air_y
+    peak_f, peak_r = peaks(body)
+    f_f = tyre(delta - ca.atan((v_y + p["l_f"] * yaw_rate) / v_x), peak_f)
+    f_r = tyre(-ca.atan((v_y - p["l_r"] * yaw_rate) / v_x), peak_r)
+    drag, side = air(body, v_x, v_y, psi, wind)
     progress = (v_x * ca.cos(e_psi) - v_y * ca.sin(e_psi)) / (1 - e_y * kappa)
     f_lateral = f_f * ca.cos(delta)
     return ca.vertcat(
@@ -155,6 +174,70 @@ def steady(body, stiffness_r, v_x, kappa):
     return kappa * v_x * (p["l_r"] - p["m"] * p["l_f"] * v_x**2 / (stiffness_r * (p["l_f"] + p["l_r"])))
 
 
+class IdealCar:
+    """A car that follows the path exactly at the speed wanted, by inverse dynamics at small angles.
+
+    Its motion is the sideslip angle [rad] and the rate of that, called turn [rad/s]: without a lateral error the heading error
+    is the sideslip angle reversed, and the yaw rate is what the path turns by less the turn.
+    """
+
+    def __init__(self, body, bounds):
+        self.body, self.increment_max = body, bounds["delta_rate_max"] * T_S
+        self.peak_f, self.peak_r = peaks(body)
+        # Of the first stage of the sample before: motion at its beginning, curvature at both ends, speed and wind.
+        self.stage_before = None
+
+    def stage(self, motion, course, v, kappa, wind):
+        """Motion at the end of a stage that begins on the course [rad], and the steering angle in the middle of it [rad]."""
+        p = self.body
+
+        def balance(part, motion):
+            """Rate of the motion and the steering angle [rad], at a part of the stage."""
+            beta, turn = motion
+            bend = kappa[0] + part * (kappa[1] - kappa[0])
+            bend_rate = (kappa[1] - kappa[0]) / T_S
+            psi = course + part * T_S * v * 0.5 * (kappa[0] + bend) - beta
+            _, side = air(p, v, v * beta, psi, wind)
+            yaw_rate = v * bend - turn
+            f = p["m"] * v**2 * bend - side
+            f_r = tyre(p["l_r"] * yaw_rate / v - beta, self.peak_r)
+            f_f = f - f_r
+            moment = p["l_f"] * f_f - p["l_r"] * f_r + p["arm_side"] * side
+            # The tyre inverted, held just short of its peak.
+            alpha_f = np.tan(np.arcsin(np.clip(f_f / self.peak_f, -0.99, 0.99)) / TYRE_C) / TYRE_B
+            return np.array([turn, v * bend_rate - moment / p["i_z"]]), alpha_f + beta + p["l_f"] * yaw_rate / v
+
+        h = T_S / 2
+        for begin in (0.0, 0.5):
+            # What remains of the steering angles is that of the second half's beginning.
+            k_1, delta = balance(begin, motion)
+            k_2, _ = balance(begin + 0.25, motion + h / 2 * k_1)
+            k_3, _ = balance(begin + 0.25, motion + h / 2 * k_2)
+            k_4, _ = balance(begin + 0.5, motion + h * k_3)
+            motion = motion + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        return motion, delta
+
+    def increments(self, start, kappa, wind, v_ref):
+        """Increments of its steering angle from stage to stage [rad], the first of them since the sample before."""
+        v_x, v_y, _, _, e_psi, psi = start
+        course, before = psi - e_psi, None
+        if self.stage_before is None:
+            motion = np.array([v_y / v_x, 0.0])
+        else:
+            motion, bend, v, blew = self.stage_before
+            motion, before = self.stage(motion, course - T_S * v * 0.5 * (bend[0] + bend[1]), v, bend, blew)
+        self.stage_before = motion, kappa[:2].copy(), v_ref[0], wind[0]
+        deltas = []
+        for i in range(len(kappa) - 1):
+            motion, delta = self.stage(motion, course, v_ref[i], kappa[i : i + 2], wind[i])
+            deltas.append(delta)
+            course += T_S * v_ref[i] * 0.5 * (kappa[i] + kappa[i + 1])
+        steps = np.diff(deltas, prepend=deltas[0] if before is None else before)
+        largest = np.abs(steps).max()
+        # What the steering cannot do is no reference: the further beyond, the less of it is left.
+        return steps * (self.increment_max / largest) ** 2 if largest > self.increment_max else steps
+
+
 class Planner:
     """The receding-horizon problem, by multiple shooting."""
 
@@ -165,6 +248,7 @@ class Planner:
         x, u = ca.SX.sym("x", nx, horizon + 1), ca.SX.sym("u", 2, horizon)
         start, before = ca.SX.sym("start", nx), ca.SX.sym("before", 2)
         kappa, wind, v_ref = (ca.SX.sym(name, horizon + 1) for name in ("kappa", "wind", "v_ref"))
+        increments = ca.SX.sym("increments", horizon)
         stiffness_r = TYRE_B * TYRE_C * body["mu"] * body["m"] * body["g"] * body["l_f"] / (body["l_f"] + body["l_r"])
         cost, constraints = 0, [x[:, 0] - start]
         for i in range(horizon):
@@ -174,11 +258,12 @@ class Planner:
             wanted = ca.vertcat(v_ref[i + 1], v_y, kappa[i + 1] * v_ref[i + 1], 0, -v_y / v_ref[i + 1])
             error = x[:5, i + 1] - wanted
             cost += ca.dot(ca.DM([weights[name] for name in WEIGHTS[:5]]), error**2)
-            cost += ca.dot(ca.DM([weights[name] for name in WEIGHTS[5:]]), step**2)
+            unwanted = step - ca.vertcat(increments[i], 0)
+            cost += ca.dot(ca.DM([weights[name] for name in WEIGHTS[5:]]), unwanted**2)
         steps = ca.diff(ca.horzcat(before, u), 1, 1)
         problem = {
             "x": ca.vertcat(ca.vec(x), ca.vec(u)),
-            "p": ca.vertcat(start, before, kappa, wind, v_ref),
+            "p": ca.vertcat(start, before, kappa, wind, v_ref, increments),
             "f": cost,
             "g": ca.vertcat(*constraints, ca.vec(steps)),
         }
@@ -207,7 +292,7 @@ class Planner:
         }
         self.guess = None
 
-    def plan(self, start, before, kappa, wind, v_ref):
+    def plan(self, start, before, kappa, wind, v_ref, increments):
         """First command, processor time that it took [s], iterations, and whether IPOPT was content."""
         n, nx = self.horizon, len(STATES)
         if self.guess is None:
@@ -218,7 +303,7 @@ class Planner:
             x, u = self.guess
             x, u = np.vstack([x[1:], x[-1:]]), np.vstack([u[1:], u[-1:]])
         x[0] = start
-        parameters = np.concatenate([start, before, kappa, wind, v_ref])
+        parameters = np.concatenate([start, before, kappa, wind, v_ref, increments])
         begin = time.process_time()
         answer = self.solver(x0=np.concatenate([x.ravel(), u.ravel()]), p=parameters, **self.limits)
         taken = time.process_time() - begin
@@ -242,11 +327,11 @@ def blow(wind, known, now, s, v_ref):
 
 def drive(plant_archive, controller_archive, run, seconds=np.inf):
     """Rows of one run, and the weights that it was made with."""
-    road, wind_is_input, wind, known = RUNS[run]
+    road, wind_is_input, wind, known, against = RUNS[run]
     plant = Plant(plant_archive, road)
     starts = {v.name: v.start for v in fmpy.read_model_description(controller_archive).modelVariables}
     weights, bounds = ({name: float(starts[name]) for name in names} for names in (WEIGHTS, BOUNDS))
-    planner = Planner(plant.parameters(BODY), weights, bounds)
+    planner, ideal = Planner(plant.parameters(BODY), weights, bounds), IdealCar(plant.parameters(BODY), bounds)
     ahead = np.arange(HORIZON + 1)
     kappa_names, speed_names = ([f"{name}[{i + 1}]" for i in ahead] for name in ("kappa_ref", "v_x_ref"))
     state_names = ["v_x_true", "v_y_true", "yaw_rate_true", "e_y_true", "e_psi_true", "psi"]
@@ -256,7 +341,8 @@ def drive(plant_archive, controller_archive, run, seconds=np.inf):
             now = sample_number * T_S
             start, kappa, v_ref = plant.get(state_names), plant.get(kappa_names), plant.get(speed_names)
             blowing = blow(wind, known, now, plant.get(["s"])[0], v_ref)
-            command, taken, iterations, content = planner.plan(start, before, kappa, blowing, v_ref)
+            increments = ideal.increments(start, kappa, blowing, v_ref) if against == "ideal car" else np.zeros(HORIZON)
+            command, taken, iterations, content = planner.plan(start, before, kappa, blowing, v_ref, increments)
             if not content:
                 raise RuntimeError(f"no optimal plan at {now:.3f} s: {planner.solver.stats()['return_status']}")
             rows.append([now, *plant.get(RECORDED), *command, taken, iterations])

@@ -107,7 +107,11 @@ impl<'a> Figure<'a> {
                 all,
             ),
             self.over_time(
-                ["lateral-error-best", "Lateral error, the two best", "The same on a scale on which they can be seen."],
+                [
+                    "lateral-error-best",
+                    "Lateral error, the best",
+                    "Ours and the nonlinear MPC on a scale on which they can be seen.",
+                ],
                 "e_y [mm]",
                 &|run| scaled(run, "e_y_true", 1000.0),
                 best,

@@ -10,7 +10,7 @@ pub use misprints::late;
 
 use super::errata::Shot;
 use super::learning::Learning;
-use super::runs::{Figures, Run, Situation, Who, Wind};
+use super::runs::{Figures, Nonlinear, Run, Situation, Who};
 use super::verdict::{Verdict, verdicts};
 use crate::baselines::Gains;
 use crate::html::{escape, table};
@@ -31,7 +31,7 @@ pub struct Findings {
     pub learning: Learning,
     /// Computing time of each sample [s].
     pub times: Vec<(Who, Vec<f64>)>,
-    /// The nonlinear MPC on the general track, not told of the wind.
+    /// The nonlinear MPC with the textbook cost on the general track, not told of the wind.
     pub untold: Figures,
     /// LMPC at the measured speed with other weights on the steering.
     pub weighted: Vec<(f64, Figures)>,
@@ -50,7 +50,7 @@ impl Findings {
 
     /// What was promised, and whether it holds.
     pub fn verdicts(&self) -> Vec<Verdict> {
-        verdicts(&self.runs, [self.times(Who::Ours), self.times(Who::Nonlinear(Wind::Foreseen))])
+        verdicts(&self.runs, [self.times(Who::Ours), self.times(Who::Nonlinear(Nonlinear::Foreseen))])
     }
 }
 

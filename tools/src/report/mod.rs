@@ -30,7 +30,7 @@ use runs::{Run, Situation, Who};
 /// Makes the paper's tables and figures again, with baselines, errata and computing times, as one page that needs no network.
 ///
 /// Lane change and general track are driven by the controller as it ships, by linear MPC with PID as in the paper, by Stanley's
-/// law and by pure pursuit; an offline nonlinear MPC that knows the plant is the ceiling.
+/// law and by pure pursuit; an offline nonlinear MPC that knows the plant has the textbook cost and, as the ceiling, ours.
 #[derive(Clone, Debug, Parser)]
 #[command(after_help = "\
 Examples:
@@ -133,7 +133,7 @@ fn find(args: &Args, output: &Output) -> Result<Findings> {
             Who::Ours => timing::times(None)?,
             Who::Baseline(baseline) => timing::times(Some(baseline))?,
             // Timed when they were made.
-            Who::Nonlinear(wind) => reference.times(&runs::stored(Situation::General, wind))?,
+            Who::Nonlinear(nonlinear) => reference.times(&runs::stored(Situation::General, nonlinear))?,
         };
         times.push((who, seconds));
         bar.inc(1);

@@ -97,9 +97,12 @@ fn results() -> Result<String> {
         "\nThe paper calls its rms figures \"MSE\"; read as such they would exceed its own maxima. Its plant, track and wind are not\n\
          published, so the columns show the order of magnitude, not a contest. The course is the direction of motion: the body itself cannot\n\
          keep the path's heading in a curve, whoever steers.\n\n\
-         What a user would otherwise pick, and as a ceiling a nonlinear MPC with our weights, solved offline (`tools/reference/nmpc.py`).\n\
+         What a user would otherwise pick, and a nonlinear MPC with our weights, solved offline (`tools/reference/nmpc.py`).\n\
          It knows the plant, loses no time, and is told the wind: what blows now (felt, as ours does through the car), or what is going\n\
-         to blow (foreseen). Root mean squares:\n\n",
+         to blow (foreseen). Our controller weighs its increments of steering against those of a car that follows the path exactly\n\
+         (feed-forward, `lpv-mpc`, module `feedforward`). The nonlinear MPC weighs them against zero, the textbook cost, and in the last\n\
+         of its rows against the same reference, computed from its exact knowledge: in position that row is the ceiling. Root mean\n\
+         squares:\n\n",
     );
     text.push_str(&comparison()?);
     text.push_str(

@@ -100,10 +100,13 @@ mod tests {
         let reference = Reference::open().unwrap();
         let runs = [
             ("lane_change", 200.0),
+            ("lane_change_ideal", 200.0),
             ("lane_change_wind", 200.0),
             ("lane_change_wind_felt", 200.0),
+            ("lane_change_wind_felt_ideal", 200.0),
             ("general", 2000.0),
             ("general_felt", 2000.0),
+            ("general_felt_ideal", 2000.0),
             ("general_untold", 2000.0),
         ];
         for (id, length) in runs {

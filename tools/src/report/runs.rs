@@ -17,6 +17,8 @@ use crate::simulate::settings::Settings;
 pub const STEP: f64 = 0.001;
 /// Lateral error beyond which a car has left the road [m].
 pub const ROAD: f64 = 2.0;
+/// Colour of the nonlinear MPC that has our reference: far from the other seven also for eyes that do not tell red from green.
+const OLIVE: &str = "#7d8f1c";
 
 /// Where the controllers are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,13 +62,15 @@ impl Situation {
     }
 }
 
-/// What the nonlinear MPC knows of the wind.
+/// What the nonlinear MPC knows of the wind, and what its increments of steering are weighed against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wind {
-    /// What blows now: as much as a controller with perfect sensors can know.
+pub enum Nonlinear {
+    /// What blows now, as much as a controller with perfect sensors can know; zero, as in textbooks and in the paper.
     Felt,
-    /// What is going to blow.
+    /// What is going to blow; zero.
     Foreseen,
+    /// What blows now; the increments of a car that follows the path exactly, as ours are.
+    Ideal,
 }
 
 /// Who drives.
@@ -77,15 +81,16 @@ pub enum Who {
     /// What a user would otherwise pick.
     Baseline(Baseline),
     /// Nonlinear MPC that knows the plant, solved offline and stored.
-    Nonlinear(Wind),
+    Nonlinear(Nonlinear),
 }
 
 impl Who {
     /// All of them, ours first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Ours,
-        Self::Nonlinear(Wind::Felt),
-        Self::Nonlinear(Wind::Foreseen),
+        Self::Nonlinear(Nonlinear::Felt),
+        Self::Nonlinear(Nonlinear::Foreseen),
+        Self::Nonlinear(Nonlinear::Ideal),
         Self::Baseline(Baseline::LinearFixed),
         Self::Baseline(Baseline::LinearMeasured),
         Self::Baseline(Baseline::Stanley),
@@ -96,8 +101,9 @@ impl Who {
     pub fn name(self) -> &'static str {
         match self {
             Self::Ours => "LPV-MPC (ours)",
-            Self::Nonlinear(Wind::Felt) => "nonlinear MPC (offline), wind felt",
-            Self::Nonlinear(Wind::Foreseen) => "nonlinear MPC (offline), wind foreseen",
+            Self::Nonlinear(Nonlinear::Felt) => "nonlinear MPC (offline), wind felt",
+            Self::Nonlinear(Nonlinear::Foreseen) => "nonlinear MPC (offline), wind foreseen",
+            Self::Nonlinear(Nonlinear::Ideal) => "nonlinear MPC (offline), wind felt, our increments",
             Self::Baseline(baseline) => baseline.name(),
         }
     }
@@ -106,8 +112,9 @@ impl Who {
     pub fn id(self) -> &'static str {
         match self {
             Self::Ours => "ours",
-            Self::Nonlinear(Wind::Felt) => "nonlinear_felt",
-            Self::Nonlinear(Wind::Foreseen) => "nonlinear",
+            Self::Nonlinear(Nonlinear::Felt) => "nonlinear_felt",
+            Self::Nonlinear(Nonlinear::Foreseen) => "nonlinear",
+            Self::Nonlinear(Nonlinear::Ideal) => "nonlinear_ideal",
             Self::Baseline(Baseline::LinearFixed) => "lmpc",
             Self::Baseline(Baseline::LinearMeasured) => "lmpc_measured",
             Self::Baseline(Baseline::Stanley) => "stanley",
@@ -119,8 +126,9 @@ impl Who {
     pub fn color(self) -> &'static str {
         match self {
             Self::Ours => BLUE,
-            Self::Nonlinear(Wind::Felt) => TEAL,
-            Self::Nonlinear(Wind::Foreseen) => GREY,
+            Self::Nonlinear(Nonlinear::Felt) => TEAL,
+            Self::Nonlinear(Nonlinear::Foreseen) => GREY,
+            Self::Nonlinear(Nonlinear::Ideal) => OLIVE,
             Self::Baseline(Baseline::LinearFixed) => ORANGE,
             Self::Baseline(Baseline::LinearMeasured) => RED,
             Self::Baseline(Baseline::Stanley) => GREEN,
@@ -201,16 +209,17 @@ pub fn run(situation: Situation, who: Who, reference: &Reference) -> Result<Run>
             let mut driver = baseline.driver(&settings.controller, plant.road());
             drive(situation, &mut plant, &mut driver, STEP)?
         }
-        Who::Nonlinear(wind) => reference.run(&stored(situation, wind))?,
+        Who::Nonlinear(nonlinear) => reference.run(&stored(situation, nonlinear))?,
     };
     let figures = Figures::of(&recording);
     Ok(Run { situation, who, recording, figures })
 }
 
-/// Name of the nonlinear MPC's run; without wind there is one.
-pub fn stored(situation: Situation, wind: Wind) -> String {
-    let felt = wind == Wind::Felt && situation != Situation::LaneChange;
-    format!("{}{}", situation.id(), if felt { "_felt" } else { "" })
+/// Name of the nonlinear MPC's run; without wind there is none to feel.
+pub fn stored(situation: Situation, nonlinear: Nonlinear) -> String {
+    let felt = nonlinear != Nonlinear::Foreseen && situation != Situation::LaneChange;
+    let ideal = nonlinear == Nonlinear::Ideal;
+    format!("{}{}{}", situation.id(), if felt { "_felt" } else { "" }, if ideal { "_ideal" } else { "" })
 }
 
 /// All runs, in the order of the page; `tick` is called after each.

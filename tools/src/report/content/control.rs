@@ -6,7 +6,7 @@ use crate::plots::Page;
 use crate::recording::{PAPER, Recording};
 use crate::report::charts::Figure;
 use crate::report::data_file;
-use crate::report::runs::{Figures, ROAD, Run, Situation, Who, Wind};
+use crate::report::runs::{Figures, Nonlinear, ROAD, Run, Situation, Who};
 use crate::report::verdict::find;
 
 /// Names and units of the table of a situation.
@@ -58,14 +58,18 @@ pub fn section(page: &mut Page, findings: &Findings) {
 const CONTROL: &str = "All drive the same plant (magic formula, friction 0.82, ideal actuators) at communication steps of 1 ms, \
 sampled every 33 ms, with the same bounds, from the same signals. Who gets what:
 
-| | model | preview | wind | latency |
-|---|---|---|---|---|
-| LPV-MPC (ours) | LPV, tyres from the network along the plan | curvature, speed | estimated from what the model cannot explain | predicted over |
-| nonlinear MPC (offline) | the plant itself, 30 samples ahead | curvature, speed | told: what blows now (felt), or what is going to blow (foreseen) | none: commands act at once |
-| LMPC + PID | linear bicycle at one speed between the road's mean and highest, nominal tyres | curvature, speed | not known | predicted over |
-| LMPC at measured speed + PID | the same, linearised at each sample | curvature, speed | not known | predicted over |
-| Stanley + PID | none | curvature now | not known | none |
-| pure pursuit + PID | none | position and speed ahead | not known | none |
+| | model | preview | increments of steering weighed against | wind | latency |
+|---|---|---|---|---|---|
+| LPV-MPC (ours) | LPV, tyres from the network along the plan | curvature, speed | those of a car that follows the path exactly | estimated from what the model cannot explain | predicted over |
+| nonlinear MPC (offline) | the plant itself, 30 samples ahead | curvature, speed | zero, the textbook cost | told: what blows now (felt), or what is going to blow (foreseen) | none: commands act at once |
+| nonlinear MPC (offline), our increments | the same | curvature, speed | those of a car that follows the path exactly, from the plant itself | told: what blows now | none |
+| LMPC + PID | linear bicycle at one speed between the road's mean and highest, nominal tyres | curvature, speed | zero | not known | predicted over |
+| LMPC at measured speed + PID | the same, linearised at each sample | curvature, speed | zero | not known | predicted over |
+| Stanley + PID | none | curvature now | - | not known | none |
+| pure pursuit + PID | none | position and speed ahead | - | not known | none |
+
+What our controller weighs its increments against is feed-forward (`lpv-mpc`, module `feedforward`): the steering that the path itself asks for \
+costs nothing. The nonlinear MPC has that reference once, computed from its exact knowledge: the ceiling of the position.
 
 LMPC has our weights, bounds, horizon and solver; Stanley's gains are the defaults of MathWorks' block, pure pursuit's those of \
 Autoware's simple pure pursuit. Drag to zoom, double-click to return, click a name to hide it; the camera saves a picture, the \
@@ -82,8 +86,8 @@ fn situation(page: &mut Page, findings: &Findings, situation: Situation) {
     if situation == Situation::General {
         let e_y = |figures: &Figures| 100.0 * figures.tracking.e_y_rms;
         page.text(&format!(
-            "What the nonlinear MPC owes to being told the wind: without it, its lateral error is {:.2} cm rms, ours, which has to find \
-             the wind out, {:.2} cm.\n",
+            "What the nonlinear MPC with the textbook cost owes to being told the wind: without it, its lateral error is {:.2} cm \
+             rms, ours, which has to find the wind out, {:.2} cm.\n",
             e_y(&findings.untold),
             e_y(&find(&findings.runs, situation, Who::Ours).figures)
         ));
@@ -102,8 +106,9 @@ fn weighted(page: &mut Page, findings: &Findings) {
         vec![format!("{r_delta}"), format!("{:.3}", 100.0 * t.e_y_rms), format!("{:.2}", 100.0 * t.e_y_max)]
     }));
     page.text(
-        "Every MPC here has the weights of ours. With less weight on the steering a linear one that knows its speed comes closer in \
-         this loop without delay, lag and noise, at the price of margin against all three:\n",
+        "Every MPC here has the weights of ours; the linear ones weigh their increments of steering against zero. With less weight \
+         on the steering a linear one that knows its speed comes closer in this loop without delay, lag and noise, at the price of \
+         margin against all three:\n",
     );
     page.markup(&numbers(&rows));
 }
@@ -112,13 +117,13 @@ fn weighted(page: &mut Page, findings: &Findings) {
 fn difference(runs: &[Run], situation: Situation) -> String {
     let of = |who| find(runs, situation, who).figures;
     let ours = of(Who::Ours);
-    let ratio = |a: f64, b: f64| format!("{:.1}", a / b);
+    let ratio = |a: f64, b: f64, digits: usize| format!("{:.digits$}", a / b);
     let fixed = of(Who::Baseline(Baseline::LinearFixed));
     let behind = if fixed.stayed() {
         format!(
             "The paper's comparison, LMPC at one speed with PID, is {} times behind ours in position and {} times in speed{}.",
-            ratio(fixed.tracking.e_y_rms, ours.tracking.e_y_rms),
-            ratio(fixed.tracking.speed_rms, ours.tracking.speed_rms),
+            ratio(fixed.tracking.e_y_rms, ours.tracking.e_y_rms, 1),
+            ratio(fixed.tracking.speed_rms, ours.tracking.speed_rms, 1),
             if situation == Situation::General { " (paper: 46 and 9.5)" } else { "" }
         )
     } else {
@@ -126,22 +131,21 @@ fn difference(runs: &[Run], situation: Situation) -> String {
             "The paper's comparison, LMPC at one speed with PID, comes further than {ROAD} m from the path: off the road."
         )
     };
-    let [felt, foreseen] = [Wind::Felt, Wind::Foreseen].map(|wind| {
-        let best = of(Who::Nonlinear(wind)).tracking;
-        format!(
-            "{} times in position and {} times in speed",
-            ratio(ours.tracking.e_y_rms, best.e_y_rms),
-            ratio(ours.tracking.speed_rms, best.speed_rms)
-        )
-    });
-    if situation == Situation::LaneChange {
-        return format!(
-            "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt}. Without wind its two rows \
-             are one run.\n"
-        );
-    }
+    let over = |nonlinear| {
+        let best = of(Who::Nonlinear(nonlinear)).tracking;
+        let position = ratio(ours.tracking.e_y_rms, best.e_y_rms, 2);
+        format!("{position} and {}", ratio(ours.tracking.speed_rms, best.speed_rms, 2))
+    };
+    let [felt, foreseen, ideal] = [Nonlinear::Felt, Nonlinear::Foreseen, Nonlinear::Ideal].map(over);
+    let [textbook, feeling] = if situation == Situation::LaneChange {
+        [format!("{felt} (without wind its first two rows are one run)"), String::new()]
+    } else {
+        let told =
+            format!("{felt} when it feels the wind, as ours does through the car, {foreseen} when it foresees it");
+        [told, ", feeling the wind".to_owned()]
+    };
     format!(
-        "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant: {felt} when it feels the wind, as ours \
-         does through the car, {foreseen} when it foresees it.\n"
+        "{behind} The errors of ours over those of the nonlinear MPC, which knows the plant, in position and in speed: with the \
+         textbook cost {textbook}; with our reference of the increments{feeling}, {ideal}.\n"
     )
 }

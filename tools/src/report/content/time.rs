@@ -5,7 +5,7 @@ use lpv_mpc::Parameters;
 use super::{Findings, numbers};
 use crate::baselines::Baseline;
 use crate::plots::{Chart, Curve, Page, chart};
-use crate::report::runs::{Who, Wind};
+use crate::report::runs::{Nonlinear, Who};
 use crate::report::timing::quantile;
 
 /// The section.
@@ -24,7 +24,7 @@ pub fn section(page: &mut Page, findings: &Findings) {
     }
     page.markup(&numbers(&rows));
     let t_s = Parameters::paper().t_s;
-    let shown = [Who::Ours, Who::Nonlinear(Wind::Foreseen), Who::Baseline(Baseline::LinearMeasured)];
+    let shown = [Who::Ours, Who::Nonlinear(Nonlinear::Foreseen), Who::Baseline(Baseline::LinearMeasured)];
     let curves = shown.iter().map(|who| {
         let times = findings.times(*who);
         let t: Vec<f64> = (0..times.len()).map(|k| t_s * k as f64).collect();
