@@ -61,7 +61,7 @@ pub fn verdicts(runs: &[Run], [ours, nonlinear]: [&[f64]; 2]) -> Vec<Verdict> {
         ]);
     }
     verdicts.extend(leads(runs));
-    verdicts.extend(nonlinear(runs));
+    verdicts.extend(peers(runs));
     let share = quantile(ours, 0.5) / quantile(nonlinear, 0.5);
     verdicts.push(Verdict {
         name: "computing time over the nonlinear MPC's, median".to_owned(),
@@ -85,7 +85,7 @@ fn leads(runs: &[Run]) -> impl Iterator<Item = Verdict> {
     })
 }
 
-fn nonlinear(runs: &[Run]) -> Vec<Verdict> {
+fn peers(runs: &[Run]) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for situation in Situation::ALL {
         let calm = situation == Situation::LaneChange;
