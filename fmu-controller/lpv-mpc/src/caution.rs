@@ -8,7 +8,7 @@
 //!
 //! Measured on the general track, up to 25 m/s, and on the straight in a gust, with delays of 0.1 to 0.25 s that are assumed
 //! right or 20 ms wrong (`cargo fmu robustness --case fast_wrong`, `--case fast_gust`): without this the car is lost with delays
-//! from 0.15 s on that are assumed too short, and leaves the path by 0.8 m and more where those are assumed too long; with it
+//! from 0.15 s on that are assumed too short, and leaves the path by 0.7 m and more where those are assumed too long; with it
 //! by at most 29 cm. On the general track a delay of 0.25 s that is assumed right costs 1.6 cm with it and 0.7 without. Lags
 //! count for nothing here: they are slow, but never late.
 

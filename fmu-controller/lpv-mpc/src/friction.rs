@@ -36,9 +36,9 @@ const GRIP: [f64; 2] = [0.8, 1.25];
 const INITIAL: [f64; 4] = [estimator::INITIAL[V_Y], estimator::INITIAL[YAW_RATE], 0.3, 0.3];
 
 /// Intensities of the random walks [m/s2, rad/s2, 1, 1 per root second]: gusts of the general track, and roads that change within
-/// seconds. With twice the wind's most lane changes of `cargo fmu campaign --untold` grow by a fifth to a half (`linear` at
-/// 13.8 m/s from 0.4 to 0.6 cm); with half of it many shrink, by up to 0.4 mm, and `network_now` on that tyre grows from 1.1 to
-/// 1.3 cm.
+/// seconds. With twice the wind's most lane changes of `cargo fmu campaign --untold` with other tyres or friction grow by a
+/// fifth to a half (`linear` at 13.8 m/s from 0.4 to 0.6 cm); with half of it many shrink, by up to 0.4 mm, and `network_now` on
+/// that tyre grows from 1.1 to 1.3 cm.
 ///
 /// Those of the factors end where they would make them less certain than at first: a long straight tells nothing.
 const WALK: [f64; 4] = [0.5, 0.25, 0.1, 0.1];
@@ -52,17 +52,18 @@ const RATE_MAX: f64 = 600.0;
 const TOGETHER: f64 = 0.7;
 
 /// Standard deviations of the unexplained accelerations [m/s2, rad/s2]: twice what the estimator's own covariance settles to
-/// under one unit of sensor noise, because its errors last for two samples. Half and twice that change nothing by more than
-/// 0.2 mm.
+/// under one unit of sensor noise, because its errors last for two samples. With half of that
+/// no lane change of `cargo fmu campaign --untold` changes by more than 1.6 mm; with twice most of those with other tyres or
+/// friction grow, by up to 1.9 mm (`linear` at 13.8 m/s from 0.4 to 0.6 cm).
 const DEVIATION: [f64; 2] = [1.5, 0.3];
 
 /// Time by which a force may be off [s]: while the tyres' accelerations change, this times their rate adds to [`DEVIATION`].
 ///
 /// A delay that is assumed wrong by a sample, or ice that begins under the car, shows as an acceleration that looks like wrong
-/// tyres. Without this the lane change with lag, delay 20 ms wrong and noise grows from 2.7 to 4.2 cm and that onto ice from 6.3
-/// to 8.5 cm (`cargo fmu robustness --case slow_noise`, `--case patch`). With 0.3 s the former is 2.5 cm and the gust at 25 m/s
-/// 6.4 cm instead of 6.0 (`--case fast_gust`); with 1 s other tyres are learnt later: the lane change at 13.8 m/s on `linear`
-/// grows from 0.4 to 0.6 cm (`cargo fmu campaign --untold`).
+/// tyres. Without this the lane change with lag, delay 20 ms wrong and noise grows from 2.6 to 3.9 cm and that onto ice from 6.3
+/// to 8.5 cm (`cargo fmu robustness --case slow_noise`, `--case patch`). With 0.3 s the gust at 25 m/s costs 6.4 cm instead of
+/// 6.0 (`--case fast_gust`); with 1 s other tyres are learnt later: the lane change at 13.8 m/s on `linear` grows from 0.4 to
+/// 0.6 cm (`cargo fmu campaign --untold`).
 const LATE: f64 = 0.5;
 
 /// Time over which a change of the forces is remembered [s]: the estimator takes that long to settle after it.

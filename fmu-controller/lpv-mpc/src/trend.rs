@@ -1,9 +1,10 @@
 //! Where the accelerations are going that the model cannot explain.
 //!
 //! A wind turns against the car as the car turns, gusts rise over tenths of a second, a tyre comes nearer to its limit. A plan
-//! that took the present estimate for all of its stages would lag behind each of them: on the general track by 1.4 mm in every
-//! long bend (`cargo fmu simulate --road general`; with the trend the root mean square falls from 0.10 to 0.04 cm). So
-//! the estimate's own change over the last moments is carried on, for a short time only: a trend that fades.
+//! that took the present estimate for all of its stages would lag behind each of them: on the general track by 1 to 2 mm in
+//! most bends (`cargo fmu simulate --road general`; with the trend the root mean square falls from 0.07 to 0.01 cm), at the limit
+//! of grip by far more (`cargo fmu robustness --case grip_17`: 26 cm instead of 7.5). So the estimate's own change over the last
+//! moments is carried on, for a short time only: a trend that fades.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,21 +13,24 @@ use crate::model::Disturbance;
 
 /// Time over which the change is averaged [s].
 ///
-/// Longer, the trend comes too late (lane change with a delay that is assumed 20 ms wrong: 1.5 cm, with 0.3 s 1.9, without a
-/// trend 2.0); shorter, noise steers (root mean square of the steering increments in one unit of sensor noise on the general
-/// track: 4.8 mrad, with 0.08 s 5.1, with 0.3 s 4.4, without a trend 3.8). Measured with the sensors' noise taken as told and
-/// nothing learnt of the tyres.
+/// Longer, the trend comes too late (`cargo fmu robustness --case slow_wrong`: 1.3 cm, with 0.3 s 1.6, without a trend 1.8;
+/// `--case grip_range`: 8 cm, 15, 33); shorter, noise steers (root mean square of the steering increments on the general track
+/// in one unit of sensor noise, `cargo fmu simulate --road general --set plant.noise_scale=1 --csv run.csv`: 5.6 mrad, with
+/// 0.08 s 6.1, with 0.3 s 5.2, without a trend 4.6) and grip ends sooner (`grip_range` with 0.08 s: 23 cm).
 const MEMORY: f64 = 0.15;
 
-/// Time after which the trend has faded [s]: that of a gust's rise. With 0.2 or 1 s nothing in `cargo fmu robustness --cases` or
-/// on the general track changes by more than a tenth.
+/// Time after which the trend has faded [s]: that of a gust's rise. With 0.2 or 1 s nothing with a limit in
+/// `cargo fmu robustness --cases` or on the general track changes by more than an eighth, but the way made while standing with
+/// 1 s: 3.6 mm instead of 1.4.
 const REACH: f64 = 0.3;
 
 /// What the trend does not carry an acceleration beyond [m/s2, m/s2, rad/s2].
 ///
 /// A side wind of 38 m/s gives 2 m/s2; as much yaw acceleration would take an arm of 1.8 m, seven times the default. More is a
-/// car that slides: its tyres lose what the model believes faster and faster, and steering ahead of that loses the car
-/// (`cargo fmu robustness --case patch_unseen`: 1.8 m, without the bound 27 m).
+/// car that slides or swings: its tyres lose what the model believes faster and faster, and steering ahead of that loses the car.
+/// Without the bound the general track with a delay of 0.25 s that is assumed 20 ms too short costs 2.9 m instead of 0.17
+/// (`cargo fmu robustness --case fast_wrong`), and the lane change with lag, delay 20 ms wrong and noise 4.2 cm instead of 2.6
+/// (`--case slow_noise`); a gust at its worst gains (`--case crosswind_peak`: 1.0 cm instead of 1.5).
 const BOUND: f64 = 2.0;
 
 /// An unexplained acceleration and its trend.
