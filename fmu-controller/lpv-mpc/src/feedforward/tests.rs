@@ -132,17 +132,23 @@ fn wind_that_is_steady_asks_for_no_increment() {
 }
 
 #[test]
-fn what_the_steering_cannot_follow_is_reduced_as_a_whole() {
+fn what_the_steering_cannot_follow_is_reduced_and_more_from_there_on() {
     let body = body();
-    let mut all = increments(slalom, 40);
-    let whole = all.clone();
-    let largest = all.iter().fold(0.0_f64, |largest, increment| largest.max(increment.abs()));
-    straight_ahead(None, &body).executable(&mut all, 0.0, 2.0 * largest);
-    assert_eq!(all, whole);
-    straight_ahead(None, &body).executable(&mut all, 0.0, 0.5 * largest);
-    for (reduced, whole) in all.iter().zip(&whole) {
-        assert!((reduced - 0.25 * whole).abs() < 1e-15);
+    let possible = [0.1, -0.2, 0.2, 0.0];
+    let mut all = possible;
+    straight_ahead(None, &body).executable(&mut all, 0.0, 0.2);
+    assert_eq!(all, possible);
+    let mut all = [0.1, 0.2, -0.4, 0.1, 0.8, 0.1];
+    straight_ahead(None, &body).executable(&mut all, 0.0, 0.2);
+    // All by (0.2 / 0.8)^2; the third and fourth by (0.2 / 0.4)^2 too, the last two by (0.2 / 0.8)^2.
+    let expected = [0.1, 0.2, -0.4 / 4.0, 0.1 / 4.0, 0.8 / 16.0, 0.1 / 16.0].map(|increment: f64| increment / 16.0);
+    for (reduced, expected) in all.iter().zip(expected) {
+        assert!((reduced - expected).abs() < 1e-15, "{all:?} for {expected}");
     }
+    // A steering that is held has no reference, and zero times infinity does not make it no number.
+    let mut held = [f64::MIN_POSITIVE / 4.0, 0.0];
+    straight_ahead(None, &body).executable(&mut held, 0.0, 0.0);
+    assert_eq!(held, [0.0; 2]);
 }
 
 #[test]
