@@ -3,7 +3,7 @@
 //! A wind turns against the car as the car turns, gusts rise over tenths of a second, a tyre comes nearer to its limit. A plan
 //! that took the present estimate for all of its stages would lag behind each of them: on the general track by 1 to 2 mm in
 //! most bends (`cargo fmu simulate --road general`; with the trend the root mean square falls from 0.07 to 0.01 cm), at the limit
-//! of grip by far more (`cargo fmu robustness --case grip_17`: 26 cm instead of 7.5). So the estimate's own change over the last
+//! of grip by far more (`cargo fmu robustness --case grip_17`: 13 cm instead of 3.3). So the estimate's own change over the last
 //! moments is carried on, for a short time only: a trend that fades.
 
 use serde::{Deserialize, Serialize};
@@ -13,10 +13,10 @@ use crate::model::Disturbance;
 
 /// Time over which the change is averaged [s].
 ///
-/// Longer, the trend comes too late (`cargo fmu robustness --case slow_wrong`: 1.3 cm, with 0.3 s 1.6, without a trend 1.8;
-/// `--case grip_range`: 8 cm, 15, 33); shorter, noise steers (root mean square of the steering increments on the general track
-/// in one unit of sensor noise, `cargo fmu simulate --road general --set plant.noise_scale=1 --csv run.csv`: 5.6 mrad, with
-/// 0.08 s 6.1, with 0.3 s 5.2, without a trend 4.6) and grip ends sooner (`grip_range` with 0.08 s: 23 cm).
+/// Longer, the trend comes too late (`cargo fmu robustness --case slow_wrong`: 1.3 cm, with 0.3 s 1.6, without a trend 1.8);
+/// shorter, noise steers (root mean square of the steering increments on the general track in one unit of sensor noise,
+/// `cargo fmu simulate --road general --set plant.noise_scale=1 --csv run.csv`: 5.6 mrad, with 0.08 s 6.1, with 0.3 s 5.2,
+/// without a trend 4.6).
 const MEMORY: f64 = 0.15;
 
 /// Time after which the trend has faded [s]: that of a gust's rise. With 0.2 or 1 s nothing with a limit in
