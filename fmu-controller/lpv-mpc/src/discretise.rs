@@ -216,10 +216,24 @@ pub fn reached<T: Scalar>(lpv: &Lpv<T>, x: &State<T>, u: &SVector<T, NU>, hold: 
         let Discrete { Phi, Gamma, d } = discretise(lpv, hold);
         return Phi * x + Gamma * u + d;
     }
-    let mut term = lpv.A * x + lpv.B * u + lpv.d;
+    let (a, b) = (|row, column| lpv.A[(row, column)], |row| lpv.B[(row, DELTA)]);
+    // With the zeros of the embedding left out.
+    let times = |[v_x, v_y, yaw_rate, _, e_psi]: [T; NX]| {
+        State::from([
+            a(V_X, V_X) * v_x + a(V_X, V_Y) * v_y + a(V_X, YAW_RATE) * yaw_rate,
+            a(V_Y, V_Y) * v_y + a(V_Y, YAW_RATE) * yaw_rate,
+            a(YAW_RATE, V_Y) * v_y + a(YAW_RATE, YAW_RATE) * yaw_rate,
+            a(E_Y, V_Y) * v_y + a(E_Y, E_PSI) * e_psi,
+            a(E_PSI, V_X) * v_x + a(E_PSI, V_Y) * v_y + yaw_rate,
+        ])
+    };
+    let mut term = times((*x).into()) + lpv.d;
+    term[V_X] += b(V_X) * u[DELTA] + u[A_X];
+    term[V_Y] += b(V_Y) * u[DELTA];
+    term[YAW_RATE] += b(YAW_RATE) * u[DELTA];
     let mut moved = term * T::from(hold.held[0]);
     for weight in &hold.held[1..] {
-        term = lpv.A * term;
+        term = times(term.into());
         moved += term * T::from(*weight);
     }
     x + moved
