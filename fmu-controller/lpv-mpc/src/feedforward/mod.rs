@@ -14,9 +14,9 @@
 //!     = C_r l_r (l_f + l_r) kappa + F_r0 (l_f + l_r) - l_f F + i_z (v kappa' - d_r),    F = m (v^2 kappa - d_y)
 //! ```
 //!
-//! with the affine tyres of the stages and the unexplained accelerations `d`; what braking adds to it, `m v' beta` and
-//! `i_z v' kappa`, is left out, a thousandth of a radian at 5 m/s2. The dynamics are stable: followed along the plan, they give the slip of the front
-//! tyres, and with it the steering.
+//! with the affine tyres of the stages and the unexplained accelerations `d`; what braking adds, `m v' beta` and `i_z v' kappa`,
+//! is left out, a thousandth of a radian at 5 m/s2. The dynamics are stable: followed along the plan, they give the slip of the
+//! front tyres, and with it the steering.
 
 mod sideslip;
 

@@ -176,7 +176,7 @@ impl Data {
     ) {
         self.b.clear();
         let u_prev = problem.u_prev_clamped();
-        // An input that cannot move is taken out: it enters as a constant, and its own variable means nothing, and is clamped when it is read.
+        // An input that cannot move is taken out: it enters as a constant; its own variable means nothing, and reading clamps it.
         let fixed = SVector::<f64, NU>::from_fn(|j, _| unless(!problem.is_frozen(j), u_prev[j]));
         let mut before = problem.x_0;
         for stage in &problem.stages {
