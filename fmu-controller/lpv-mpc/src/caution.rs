@@ -14,8 +14,8 @@
 
 /// Speed up to which the weight holds at twice [`LATENCY`] [m/s].
 ///
-/// With 15 m/s one of the 48 situations of `cargo fmu robustness --weights` leaves the road (lag and delay of 0.2 s, assumed wrong),
-/// with 13 the general track with a delay of 0.25 s that is assumed wrong grows from 30 to 32 cm.
+/// With 15 m/s one of the 48 situations of `cargo fmu robustness --weights` leaves the road (lag and delay of 0.2 s, assumed
+/// wrong), with 13 the general track with a delay of 0.25 s that is assumed wrong grows from 30 to 32 cm.
 const SPEED: f64 = 14.0;
 
 /// Latency that asks for no caution at any speed [s]: one period and a usual steering's delay. At 25 m/s and 70 ms that are
