@@ -229,8 +229,7 @@ impl Controller {
             let Self { beliefs: Beliefs { body, tyres, .. }, estimator, snapshot, .. } = self;
             tyres.learn(&estimator.x, &snapshot.delivered, &mut estimator.trend.now, duration, body);
         }
-        self.snapshot.inputs.clone_from(inputs);
-        self.snapshot.estimator.clone_from(&self.estimator);
+        (self.snapshot.inputs, self.snapshot.estimator) = (*inputs, self.estimator);
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
         (self.snapshot.tyres[0], self.snapshot.memory) = (*self.beliefs.tyres.present(), self.beliefs.tyres.memory());
         let (x, trend, complete) = self.estimate(inputs, duration, &delivered);

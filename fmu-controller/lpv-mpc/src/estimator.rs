@@ -61,7 +61,7 @@ const SETTLED: f64 = 0.2;
 const TREND_SHARE: f64 = 0.5;
 
 /// Extended Kalman filter of the vehicle states and the unexplained accelerations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimator<T: Scalar = f64> {
     /// Estimated state.
     pub x: State<T>,
@@ -144,7 +144,7 @@ impl<T: Scalar> Estimator<T> {
     }
 
     /// The same filter on dual numbers, every derivative zero.
-    pub(crate) fn to_dual(&self) -> Estimator<Dual64>
+    pub(crate) fn to_dual(self) -> Estimator<Dual64>
     where
         T: Into<Dual64>,
     {

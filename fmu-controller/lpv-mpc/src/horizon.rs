@@ -52,10 +52,11 @@ pub fn middle<T: Scalar, const N_X: usize>(
     before: &SVector<T, N_X>,
     after: &SVector<T, N_X>,
     u: &Input<T>,
+    body: &Body,
 ) -> Point<T> {
     let middle = (before + after) * T::from(0.5);
     let acting = if N_X == NX { *u } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
-    Point::new(vehicle_part(&middle), acting)
+    Point::new(vehicle_part(&middle), acting, body)
 }
 
 /// Fills the stage at a scheduling point.

@@ -132,7 +132,7 @@ impl Latency {
                 let disturbance = trend.after(now - self.time + (done + 0.5) * h);
                 let f = |x: &State<T>, u: &Input, distance: T| {
                     let kappa = kappa(distance);
-                    motion(&Point::new(*x, u.map(T::from)), kappa, body, tyres, &disturbance)
+                    motion(&Point::new(*x, u.map(T::from), body), kappa, body, tyres, &disturbance)
                 };
                 at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;

@@ -114,7 +114,8 @@ fn guarded<T: Scalar>(v_x: T) -> (T, T) {
     (v, v_x / v)
 }
 
-/// A state and an input with the sines and cosines of their angles, which cost as much as the rest of the model.
+/// A state and an input of a car, with its speed and the functions of its angles as the model needs them: these cost as much
+/// as the rest of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point<T = f64> {
     /// State.
@@ -123,14 +124,22 @@ pub struct Point<T = f64> {
     pub u: Input<T>,
     delta: Angle<T>,
     e_psi: Angle<T>,
+    /// One over the guarded speed [s/m].
+    per_v: T,
+    /// Tangents of the angles at which the front and the rear axle move against the body [1].
+    z: [T; 2],
+    /// These angles over their tangents [1].
+    n: [T; 2],
 }
 
 impl<T: Scalar> Point<T> {
-    /// The point of a state and an input.
+    /// The point of a state and an input of a car with this body.
     #[inline(always)]
-    pub fn new(x: State<T>, u: Input<T>) -> Self {
+    pub fn new(x: State<T>, u: Input<T>, body: &Body) -> Self {
         let [delta, e_psi] = angles([u[DELTA], x[E_PSI]]);
-        Self { x, u, delta, e_psi }
+        let per_v = guarded(x[V_X]).0.recip();
+        let z = drift(&x, per_v, body);
+        Self { x, u, delta, e_psi, per_v, z, n: atan_ratios(z) }
     }
 
     /// Progress along the path [m/s], `s'` of [Kebbati, eq. (1)].
@@ -138,6 +147,12 @@ impl<T: Scalar> Point<T> {
     pub fn progress(&self, kappa: T) -> T {
         (self.x[V_X] * self.e_psi.cos - self.x[V_Y] * self.e_psi.sin) / path_factor(kappa, self.x[E_Y])
     }
+}
+
+/// Tangents of the angles at which the front and the rear axle move against the body [1].
+#[inline(always)]
+fn drift<T: Scalar>(x: &State<T>, per_v: T, body: &Body) -> [T; 2] {
+    [(x[V_Y] + x[YAW_RATE] * body.l_f) * per_v, (x[V_Y] - x[YAW_RATE] * body.l_r) * per_v]
 }
 
 /// `1 - kappa e_y`, held away from zero.
@@ -149,9 +164,7 @@ fn path_factor<T: Scalar>(kappa: T, e_y: T) -> T {
 #[inline]
 pub fn slip_angles<T: Scalar>(x: &State<T>, delta: T, body: &Body) -> (T, T) {
     let (v, ratio) = guarded(x[V_X]);
-    let per_v = v.recip();
-    let [drift_f, drift_r] =
-        atans([(x[V_Y] + x[YAW_RATE] * body.l_f) * per_v, (x[V_Y] - x[YAW_RATE] * body.l_r) * per_v]);
+    let [drift_f, drift_r] = atans(drift(x, v.recip(), body));
     (delta * ratio - drift_f, -drift_r)
 }
 
@@ -168,10 +181,10 @@ pub fn derivative<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> State<T> {
-    motion(&Point::new(*x, *u), kappa, body, tyres, disturbance).0
+    motion(&Point::new(*x, *u, body), kappa, body, tyres, disturbance).0
 }
 
-/// [`derivative`] at a point, and the progress along the path [m/s].
+/// [`derivative`] at a point of the car with this body, and the progress along the path [m/s].
 #[inline(always)]
 pub fn motion<T: Scalar>(
     at: &Point<T>,
@@ -183,8 +196,9 @@ pub fn motion<T: Scalar>(
     let [v_x, v_y, yaw_rate, _, _] = at.x.into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
     let (per_m, per_i) = (m.recip(), i_z.recip());
-    let (_, ratio) = guarded(v_x);
-    let (alpha_f, alpha_r) = slip_angles(&at.x, at.u[DELTA], body);
+    let ratio = v_x * at.per_v;
+    let ([z_f, z_r], [n_f, n_r]) = (at.z, at.n);
+    let (alpha_f, alpha_r) = (at.u[DELTA] * ratio - z_f * n_f, -z_r * n_r);
     let f_yf = alpha_f * tyres.c_f + tyres.f_f0;
     let f_yr = alpha_r * tyres.c_r + tyres.f_r0;
     let (Angle { sin: s, cos: c, .. }, Angle { sin: s_psi, cos: c_psi, .. }) = (at.delta, at.e_psi);
@@ -215,10 +229,10 @@ pub fn embed<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> Lpv<T> {
-    embed_at(&Point::new(*x, *u), kappa, body, tyres, disturbance)
+    embed_at(&Point::new(*x, *u, body), kappa, body, tyres, disturbance)
 }
 
-/// [`embed`] at a point.
+/// [`embed`] at a point of the car with this body.
 #[inline(always)]
 pub fn embed_at<T: Scalar>(
     at: &Point<T>,
@@ -227,17 +241,16 @@ pub fn embed_at<T: Scalar>(
     tyres: &Tyres<T>,
     disturbance: &Disturbance<T>,
 ) -> Lpv<T> {
-    let [v_x, v_y, yaw_rate, e_y, _] = at.x.into();
+    let [v_x, v_y, _, e_y, _] = at.x.into();
     let Body { m, i_z, l_f, l_r, drag, rolling } = *body;
     let Tyres { c_f, c_r, f_f0, f_r0 } = *tyres;
     // Reciprocals once: a division costs five products.
     let (per_m, per_i) = (m.recip(), i_z.recip());
-    let (v, ratio) = guarded(v_x);
     let (Angle { sin: s, cos: c, .. }, Angle { sin: s_psi, cos: c_psi, sinc }) = (at.delta, at.e_psi);
+    let ([n_f, n_r], per_v) = (at.n, at.per_v);
+    let ratio = v_x * per_v;
     // Stiffness per metre per second of lateral velocity at the axle.
-    let per_v = v.recip();
-    let [drift_f, drift_r] = atan_ratios([(v_y + yaw_rate * l_f) * per_v, (v_y - yaw_rate * l_r) * per_v]);
-    let (k_f, k_r) = (drift_f * per_v * c_f, drift_r * per_v * c_r);
+    let (k_f, k_r) = (n_f * per_v * c_f, n_r * per_v * c_r);
     let k_path = kappa / path_factor(kappa, e_y);
     let (k_fs, k_fc) = (k_f * s, k_f * c);
     let moment = k_fc * l_f - k_r * l_r;
@@ -346,6 +359,33 @@ mod tests {
         printed[(E_Y, V_X)] = x[E_PSI].sin();
         printed[(E_Y, E_PSI)] = 0.0;
         assert_eq!(rank(&printed), 4);
+    }
+
+    #[test]
+    fn forces_are_those_of_the_slip_angles() {
+        let mut rng = Pcg64Mcg::seed_from_u64(2);
+        let (body, mut steep, mut slow) = (body(), 0, 0);
+        let Body { m, i_z, l_f, l_r, .. } = body;
+        for _ in 0..10_000 {
+            let mut draw = |low: f64, high: f64| rng.random_range(low..high);
+            let (v_x, v_y, yaw_rate, delta) = (draw(0.0, 20.0), draw(-3.0, 3.0), draw(-1.0, 1.0), draw(-0.6, 0.6));
+            let tyres = Tyres::secant(draw(1e4, 1e5), draw(1e4, 1e5));
+            // The library's arctangent, and the signs of the errata.
+            let v = v_x.max(V_GUARD);
+            let alpha_f = delta * v_x / v - ((v_y + l_f * yaw_rate) / v).atan();
+            let alpha_r = -((v_y - l_r * yaw_rate) / v).atan();
+            let (f_f, f_r) = (tyres.c_f * alpha_f * delta.cos(), tyres.c_r * alpha_r);
+            let x = State::from([v_x, v_y, yaw_rate, 0.0, 0.0]);
+            let rates = derivative(&x, &Input::from([delta, 0.0]), 0.0, &body, &tyres, &Disturbance::zeros());
+            // A few roundings of forces of up to 1e5 N.
+            assert!((rates[V_Y] - ((f_f + f_r) / m - yaw_rate * v_x)).abs() < 1e-12, "{x} {delta}");
+            assert!((rates[YAW_RATE] - (l_f * f_f - l_r * f_r) / i_z).abs() < 1e-12, "{x} {delta}");
+            let (of_function_f, of_function_r) = slip_angles(&x, delta, &body);
+            assert!((of_function_f - alpha_f).abs().max((of_function_r - alpha_r).abs()) < 1e-15, "{x} {delta}");
+            steep += usize::from(((v_y + l_f * yaw_rate) / v).abs() > 0.15);
+            slow += usize::from(v_x < V_GUARD);
+        }
+        assert!(steep > 1000 && slow > 1000, "{steep} {slow}");
     }
 
     #[test]

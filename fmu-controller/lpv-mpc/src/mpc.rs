@@ -240,7 +240,7 @@ impl<const N_X: usize> Mpc<N_X> {
         let before = Before { v_x, disturbance: guide.disturbance_before() };
         let mut ideal = FeedForward::new(body, hold.step, &from, self.past, before);
         for (i, stage) in self.problem.stages.iter_mut().enumerate() {
-            let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i]);
+            let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i], body);
             let path = guide.advance(|kappa| at.progress(kappa));
             self.tyres[i] = tyres.at(&at.x, &at.u, path.mu);
             if i as f64 * hold.step < SOON {

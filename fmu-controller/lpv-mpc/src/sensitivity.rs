@@ -117,7 +117,7 @@ pub(crate) fn along<const N_X: usize>(
     let mut increments = Vec::with_capacity(change.stages.len());
     for (i, stage) in change.stages.iter_mut().enumerate() {
         let node = |i: usize| if i == 0 { x_0 } else { mpc.schedule.x[i].map(Dual64::from) };
-        let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from));
+        let scheduled = middle(&node(i), &node(i + 1), &mpc.schedule.u[i].map(Dual64::from), body);
         let path = guide.advance(|kappa| scheduled.progress(kappa));
         let tyres = match &mut neighbours {
             Some(neighbours) => neighbours.at(&mpc.tyres[i], &scheduled.x, &scheduled.u, path.mu),

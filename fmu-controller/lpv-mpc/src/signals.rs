@@ -14,7 +14,7 @@ use crate::preview::{PREVIEW, Preview};
 pub type Trajectory = SVector<f64, HORIZON_MAX>;
 
 /// What is measured, and what is wanted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {
     /// Longitudinal velocity, body frame [m/s].
     pub v_x: f64,
@@ -93,7 +93,7 @@ impl Inputs {
     /// The previewed road with its derivative along a `direction` of the inputs.
     pub(crate) fn road_along(&self, direction: &Self, p: &Parameters) -> Road<Dual64> {
         // A preview that is held follows its first element.
-        let direction = Self { hold_preview: self.hold_preview, ..direction.clone() };
+        let direction = Self { hold_preview: self.hold_preview, ..*direction };
         let (values, slopes) = (self.rows(), direction.rows());
         let dual = |k: usize| std::array::from_fn(|i| Dual64::new(values[k][i], slopes[k][i]));
         Road::new(std::array::from_fn(dual), p)

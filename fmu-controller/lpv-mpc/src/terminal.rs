@@ -70,7 +70,7 @@ impl Terminal {
         let mut x = State::zeros();
         x[V_X] = v_x;
         let mut end = Stage::<N_X, NU>::default();
-        linearise(&Point::new(x, Input::zeros()), &straight, tyres, &around, Linear::from(&mut end));
+        linearise(&Point::new(x, Input::zeros(), body), &straight, tyres, &around, Linear::from(&mut end));
         // Without a solution the weight of before stays; what it was made for was not far.
         let equation = Equation { A: &end.A, B: &end.B, q: &problem.q, r: &problem.r };
         if let Some(weight) = equation.solution() {

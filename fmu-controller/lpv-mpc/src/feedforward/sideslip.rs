@@ -37,7 +37,7 @@ impl<T: Scalar> Sideslip<T> {
         let inertia = i_z / (l * period);
         let damping = c_r * (per_v * (0.5 * l_r) + 0.25 * period);
         let drive = c_r * (bend * l_r - self.beta) + f_r0 - (force * l_f - turn * i_z) * l.recip();
-        let rate = (self.rate * (-damping + inertia) + drive) / (damping + inertia);
+        let rate = (self.rate * (-damping + inertia) + drive) * (damping + inertia).recip();
         let mean = (self.rate + rate) * 0.5;
         let beta = self.beta + mean * (0.5 * period);
         let yaw = bend - mean * per_v;

@@ -18,8 +18,11 @@ const SMALL: usize = 2;
 /// Outputs of the last layer.
 const OUTPUTS: usize = FEEDBACK;
 
-/// What the first layer sees: the measured inputs and the memory, as many as there are.
-pub type Inputs = [f64; INPUTS_ACCELERATIONS + FEEDBACK];
+/// Most numbers that a network sees.
+const SEEN_MAX: usize = INPUTS_ACCELERATIONS + FEEDBACK;
+
+/// What the first layer sees: the measured inputs, the memory, and zeros behind them.
+pub type Inputs = [f64; SEEN_MAX];
 /// A direction of the input: the elements that are not zero, with their indices.
 pub type Direction = [(usize, f64)];
 
@@ -63,8 +66,8 @@ fn in_blocks(values: impl IntoIterator<Item = f64>) -> Vec<Block> {
 /// The first layer, in blocks of neurons.
 #[derive(Clone, Debug, PartialEq)]
 struct First {
-    /// For each block the weights of its neurons, input by input.
-    weights: Vec<Vec<Block>>,
+    /// For each block the weights of its neurons, input by input; 0 for inputs that there are not.
+    weights: Vec<[Block; SEEN_MAX]>,
     /// For each block the biases of its neurons.
     biases: Vec<Block>,
     /// For each output the change of the neurons' sums along the output's direction.
@@ -74,11 +77,11 @@ struct First {
 impl First {
     /// Of a layer whose inputs are quantities in their own units; values and changes take factors.
     fn new(layer: &Layer, directions: [&Direction; OUTPUTS], (value, change): (f64, f64)) -> Self {
-        let inputs: Vec<_> =
-            (0..layer.weights[0].len()).map(|i| in_blocks(layer.weights.iter().map(|row| value * row[i]))).collect();
+        let weight = |row: &[f64], i: usize| row.get(i).map_or(0.0, |weight| value * weight);
+        let inputs: [_; SEEN_MAX] = std::array::from_fn(|i| in_blocks(layer.weights.iter().map(|row| weight(row, i))));
         let along = |row: &[f64], direction: &Direction| direction.iter().map(|(i, x)| row[*i] * x).sum::<f64>();
         Self {
-            weights: (0..inputs[0].len()).map(|block| inputs.iter().map(|blocks| blocks[block]).collect()).collect(),
+            weights: (0..inputs[0].len()).map(|block| inputs.each_ref().map(|blocks| blocks[block])).collect(),
             biases: in_blocks(layer.biases.iter().map(|bias| value * bias)),
             along: directions.map(|to| in_blocks(layer.weights.iter().map(|row| change * along(row, to)))),
         }
@@ -88,8 +91,9 @@ impl First {
     #[inline(always)]
     fn sums(&self, block: usize, x: &Inputs) -> Block {
         let mut sums = self.biases[block];
-        for (weights, x) in self.weights[block].iter().zip(x) {
-            axpy(*x, weights, &mut sums);
+        let weights = &self.weights[block];
+        for i in 0..SEEN_MAX {
+            axpy(x[i], &weights[i], &mut sums);
         }
         sums
     }
@@ -147,8 +151,11 @@ type Last = [(Vec<Block>, f64); OUTPUTS];
 
 #[inline(always)]
 fn dot<const B: usize>(weights: &[Block], x: &Values<B>) -> f64 {
-    let mut products = [0.0; LANES];
-    for (weights, x) in weights.iter().zip(x) {
+    let mut blocks = weights.iter().zip(x);
+    // Every layer has a block; from nothing the sum would begin one addition later.
+    let Some((weights, x_0)) = blocks.next() else { return 0.0 };
+    let mut products = times(weights, x_0);
+    for (weights, x) in blocks {
         for lane in 0..LANES {
             products[lane] += weights[lane] * x[lane];
         }

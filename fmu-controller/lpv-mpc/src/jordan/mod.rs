@@ -184,7 +184,7 @@ impl Network {
         self.document.envelope.belief(&measured.values()[..n], slip_angles)
     }
 
-    /// What the layers see: the measured inputs, followed by the memory.
+    /// What the layers see: the measured inputs, followed by the memory and by zeros, whose weights are zero too.
     #[inline(always)]
     fn seen(&self, memory: &Memory, measured: &Measured) -> Inputs {
         let Measured { v_x, v_y, yaw_rate, delta, a_x, a_y, yaw_acceleration } = *measured;

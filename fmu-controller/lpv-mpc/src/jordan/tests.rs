@@ -72,9 +72,8 @@ fn by_the_formula(document: &Document, memory: &Memory, measured: &Measured) -> 
 
 #[test]
 fn packed_layers_compute_the_formula() {
-    for (seed, sizes) in
-        [(1, &[7, 8, 5, 2][..]), (2, &[7, 12, 6, 2]), (3, &[9, 16, 8, 2]), (4, &[7, 3, 2]), (5, &[7, 2])]
-    {
+    let shapes = [&[7, 8, 5, 2][..], &[7, 12, 6, 2], &[9, 16, 8, 2], &[7, 3, 2], &[7, 2], &[7, 32, 20, 2], &[9, 24, 2]];
+    for (seed, sizes) in (1..).zip(shapes) {
         let network = network(seed, sizes);
         let mut memory = network.nominal();
         for _ in 0..20 {
@@ -96,7 +95,12 @@ fn reading_what_was_written_gives_the_same_bits() {
 
 #[test]
 fn tangent_is_the_slope_of_the_force() {
-    let network = network(2, &[7, 12, 6, 2]);
+    for (seed, sizes) in (2..).zip([&[7, 12, 6, 2][..], &[9, 16, 8, 2], &[9, 32, 24, 2], &[7, 2]]) {
+        tangent_is_the_slope(&network(seed, sizes));
+    }
+}
+
+fn tangent_is_the_slope(network: &Network) {
     let memory = network.nominal();
     let (_, belief) = network.linearise(&memory, &TURN);
     let document = network.document();

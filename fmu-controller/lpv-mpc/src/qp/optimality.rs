@@ -4,6 +4,7 @@ use super::{Problem, Solution, Stage};
 use nalgebra::SVector;
 
 /// Sets the costates of a plan: λ_N = 2 W_N (x_N - x_ref_N) + soft term, λ_i = A_i' λ_(i+1) + 2 W_i (x_i - x_ref_i) + soft term.
+#[inline(always)]
 pub fn costates<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
     let N = problem.stages.len();
     let k = problem.soft_state;

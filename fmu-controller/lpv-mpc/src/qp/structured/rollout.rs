@@ -57,6 +57,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     ///
     /// Stopping at a bound at once, instead of after the sweep, lets the later inputs answer to it: fewer bounds enter by
     /// mistake, and every sweep ends in a plan that can be executed.
+    #[inline(always)]
     pub(super) fn follow(
         &mut self,
         problem: &Problem<NX, NU>,

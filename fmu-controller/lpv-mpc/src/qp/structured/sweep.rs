@@ -18,6 +18,7 @@ pub(super) struct Released {
 
 impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     /// Policies on the active set. Returns whether the curvature was positive throughout.
+    #[inline(always)]
     pub(super) fn backward(&mut self, problem: &Problem<NX, NU>) -> bool {
         let N = self.horizon;
         let r = &problem.r.data.0[0];
@@ -58,6 +59,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     }
 
     /// Sets costates, multipliers and residual of the plan, and leaves the bounds whose multipliers have the wrong sign.
+    #[inline(always)]
     pub(super) fn multipliers(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) -> Released {
         optimality::costates(problem, solution);
         solution.residual = 0.0;
