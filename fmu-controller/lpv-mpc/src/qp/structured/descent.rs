@@ -4,7 +4,7 @@ use super::active::Active;
 use super::rollout;
 use super::sweep::Released;
 use super::{Outcome, Problem, STATIONARY, Solution, Structured};
-use crate::lanes::{Work, of_four};
+use crate::lanes::{Work, widest};
 use std::mem;
 
 /// Fraction of the way to a target below which a step stands still.
@@ -19,7 +19,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     /// cost rises, the plan goes straight towards the target instead, up to the first bound: so the cost never rises, no
     /// active set comes back, and the cycles of a plain block active set are cut.
     pub(super) fn descend(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>, limit: u32) -> bool {
-        of_four(Descent { solver: self, problem, solution, limit })
+        widest(Descent { solver: self, problem, solution, limit })
     }
 
     /// [`Self::descend`], to be put where wider vectors are; what only hard problems need may stay narrow.
@@ -160,7 +160,7 @@ impl<const NX: usize, const NU: usize> Work for Descent<'_, NX, NU> {
 mod tests {
     use super::super::SWEEPS_MAX;
     use super::*;
-    use crate::lanes::same_with_all;
+    use crate::lanes::same_with_wide;
     use crate::qp_support::{Stress, random_problem};
 
     /// A solver, and the problem and plan to work on.
@@ -187,7 +187,7 @@ mod tests {
         solution.x[0] = problem.x_0;
         solver.frozen = std::array::from_fn(|j| problem.is_frozen(j));
         let fresh = || Owned { solver: solver.clone(), problem: problem.clone(), solution: solution.clone() };
-        same_with_all(fresh).0
+        same_with_wide(fresh).0
     }
 
     #[test]
