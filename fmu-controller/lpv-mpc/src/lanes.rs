@@ -25,8 +25,8 @@ impl<W: Work> WithSimd for Lanes<W> {
 /// Does `work` with the widest vectors that the processor at hand has, up to those of AVX2.
 ///
 /// Nothing is reordered or fused for them: wider vectors give the same bits. AVX-512 takes 2 to 5 % off the rest of a step, but a
-/// solve of the programme, whose rows do not fill its vectors, takes 8 % longer (`cargo bench -p lpv-mpc --bench step`, EPYC with Zen
-/// 5), and some processors lower their clock for it.
+/// solve of the programme, whose rows do not fill its vectors, takes 8 % longer, and some processors lower their clock for it
+/// (`cargo bench -p lpv-mpc --bench step`, EPYC with Zen 5).
 #[inline(always)]
 pub fn widest<W: Work>(work: W) -> W::Output {
     Arch::new().dispatch(Lanes(work))
