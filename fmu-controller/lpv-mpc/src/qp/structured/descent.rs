@@ -158,7 +158,7 @@ impl<const NX: usize, const NU: usize> Work for Descent<'_, NX, NU> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::SWEEPS_MAX;
+    use super::super::SWEEPS_BEFORE_ROWS;
     use super::*;
     use crate::lanes::same_with_wide;
     use crate::qp_support::{Stress, random_problem};
@@ -176,7 +176,7 @@ mod tests {
         #[inline(always)]
         fn run(self) -> Self::Output {
             let Self { mut solver, problem, mut solution } = self;
-            let settled = solver.settle_by_sweeps(&problem, &mut solution, SWEEPS_MAX);
+            let settled = solver.settle_by_sweeps(&problem, &mut solution, SWEEPS_BEFORE_ROWS);
             (settled, solution, solver)
         }
     }

@@ -45,13 +45,16 @@ mod warm_start;
 
 pub use tangent::{Perturbation, Tangent};
 
-/// Sweeps of block changes before other methods take over. On the recorded problems at the limit of grip and saturated the 99th
-/// percentile is lowest with 4 or 5 (N = 10): with 8 it is up to a third higher, with 20 twice as high, with 3 by a half.
-const SWEEPS_MAX: u32 = 4;
+/// Sweeps of block changes before single changes take over. On the recorded problems at the limit of grip and saturated the 99th
+/// percentile is lowest with 4 (`cargo fmu bench`, N = 10): with 5 it is up to a fifth higher, with 8 up to two fifths.
+const SWEEPS_BEFORE_ROWS: u32 = 4;
+/// Sweeps before interior points, which are dearer: with 4 or 8 what these settle of the recorded problems with N = 20 and 40
+/// takes 3 to 9 % longer.
+const SWEEPS_BEFORE_INTERIOR: u32 = 5;
 /// Sweeps in which a set found otherwise has to stand; the second one mends what rounding left.
 const CONFIRMING_SWEEPS: u32 = 3;
 /// Inputs and soft bounds of all samples up to which single changes come before interior points. There are more changes on a
-/// longer horizon, and each is dearer; at 45, `N = 15`, both cost the same on recorded problems.
+/// longer horizon, and each is dearer: at 60, `N = 20`, hard ones among the recorded problems take a quarter longer by them.
 const DENSE_ROWS_MAX: usize = 45;
 /// Scaled multiplier of the wrong sign that is rounding.
 const WRONG_SIGN: f64 = 1e-10;
@@ -125,7 +128,8 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             self.frozen[j] = problem.is_frozen(j);
         }
         // Numbers that are not finite always reach the residual, so only a solve that fails has to look for them.
-        if !self.descend(problem, solution, SWEEPS_MAX) {
+        let sweeps = if self.is_dense() { SWEEPS_BEFORE_ROWS } else { SWEEPS_BEFORE_INTERIOR };
+        if !self.descend(problem, solution, sweeps) {
             if !problem.is_valid() {
                 solution.outcome = Outcome::Invalid;
                 self.reset();
@@ -145,6 +149,11 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         solution.gain_u_prev.data.0 = policy.L;
     }
 
+    /// Whether single changes come before interior points.
+    fn is_dense(&self) -> bool {
+        self.horizon * (NU + 1) <= DENSE_ROWS_MAX
+    }
+
     /// Solves what block changes have not settled.
     fn settle_otherwise(&mut self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
         // The first sweep leaves a plan within the bounds and none of the following ones a worse one.
@@ -153,7 +162,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 *input = u.data.0[0];
             }
         }
-        if self.horizon * (NU + 1) > DENSE_ROWS_MAX || !self.settle_by_rows(problem, solution) {
+        if !self.is_dense() || !self.settle_by_rows(problem, solution) {
             self.solve_interior(problem, solution);
         }
     }

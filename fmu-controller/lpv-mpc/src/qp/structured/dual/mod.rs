@@ -158,7 +158,7 @@ impl<const NX: usize, const NU: usize> Dual<NX, NU> {
     /// Appends a row unless it depends on the others; then `coupling` holds what [`Cholesky::append`] leaves.
     fn append(&mut self, bounds: &Bounds<NX, NU>, row: Row) -> bool {
         let k = self.rows.len();
-        self.response.answer_one(bounds, row);
+        self.response.answer_one(bounds, row, &self.rows);
         for (coupling, other) in self.coupling.iter_mut().zip(&self.rows) {
             *coupling = -self.response.along(*other);
         }

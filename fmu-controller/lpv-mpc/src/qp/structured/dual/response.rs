@@ -86,10 +86,11 @@ impl<const NX: usize, const NU: usize> Response<NX, NU> {
         true
     }
 
-    /// Answer to a multiplier of one on a row.
-    pub(super) fn answer_one(&mut self, bounds: &Bounds<NX, NU>, row: Row) {
+    /// Answer to a multiplier of one on a row, up to the last sample that it or one of the `others` is in.
+    pub(super) fn answer_one(&mut self, bounds: &Bounds<NX, NU>, row: Row, others: &[Row]) {
         self.push_along(row, 1.0);
-        self.solve(bounds, row.i);
+        let until = others.iter().fold(row.i, |until, other| until.max(other.i));
+        self.solve(bounds, row.i, until);
     }
 
     /// Answer to all multipliers.
@@ -99,7 +100,7 @@ impl<const NX: usize, const NU: usize> Response<NX, NU> {
             self.push_along(*row, *nu);
             last = last.max(row.i);
         }
-        self.solve(bounds, last);
+        self.solve(bounds, last, self.u.len() - 1);
     }
 
     /// By how much the answer moves a row towards its bound.
@@ -153,8 +154,8 @@ impl<const NX: usize, const NU: usize> Response<NX, NU> {
         }
     }
 
-    /// Answer to the pushes, which it takes away; none of them is behind sample `last`.
-    fn solve(&mut self, bounds: &Bounds<NX, NU>, last: usize) {
+    /// Answer to the pushes, which it takes away, up to a sample; none of them is behind sample `last`.
+    fn solve(&mut self, bounds: &Bounds<NX, NU>, last: usize, until: usize) {
         let Bounds { problem, frozen, .. } = bounds;
         let r = &problem.r.data.0[0];
         let soft_state = problem.soft_state;
@@ -184,11 +185,11 @@ impl<const NX: usize, const NU: usize> Response<NX, NU> {
                 t[j] = -r[j] * constant[j];
             }
         }
-        for policy in &mut self.policies[last + 1..] {
+        for policy in &mut self.policies[last + 1..=until] {
             policy.k = [0.0; NU];
         }
         let (mut x, mut u) = ([0.0; NX], [0.0; NU]);
-        for (i, (policy, stage)) in self.policies.iter().zip(&problem.stages).enumerate() {
+        for (i, (policy, stage)) in self.policies[..=until].iter().zip(&problem.stages).enumerate() {
             u = policy.input(&x, &u);
             x = rollout::advance_from([0.0; NX], stage, &x, &u);
             self.u[i] = u;

@@ -11,6 +11,7 @@ use super::super::optimality;
 use super::policy::Policy;
 use super::riccati::Factor;
 use super::{Outcome, Problem, Solution, Structured};
+use crate::lanes::{Work, widest};
 use nalgebra::SVector;
 
 // Fraction to the boundary, centring, trials and start (`start`) were chosen together for the least work on the recorded
@@ -86,25 +87,12 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
         let mut polish_below = POLISH_BELOW;
         for _ in 0..ITERATIONS_MAX {
             solution.iterations += 1;
-            self.interior.set_targets(|_| 0.0);
-            if !self.interior.recursion(problem, true) {
+            let Some(Iterated { step, mu, settled }) = widest(Iteration { interior: &mut self.interior, problem })
+            else {
                 break;
-            }
-            let step = self.interior.directions(problem, 1.0);
-            let settled = self.interior.predict_active();
-            let (mu_predicted, _) = self.interior.complementarity(step);
-            let (mu, count) = self.interior.complementarity(0.0);
-            if count == 0 {
-                self.interior.advance(1.0);
-                break;
-            }
-            let centring = (mu_predicted / mu).powi(2);
-            self.interior.set_targets(|row| centring * mu - row.ds * row.dz);
-            self.interior.recursion(problem, false);
-            let step = self.interior.directions(problem, TO_BOUNDARY);
-            self.interior.advance(step);
+            };
             stationarity *= 1.0 - step;
-            let progress = self.interior.complementarity(0.0).0 / mu_start;
+            let progress = mu / mu_start;
             if !progress.is_finite() {
                 break;
             }
@@ -162,7 +150,55 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
     }
 }
 
+/// What an iteration came to.
+#[derive(Debug)]
+struct Iterated {
+    /// Share of Newton's step that was gone [1].
+    step: f64,
+    /// Mean complementarity there.
+    mu: f64,
+    /// Whether the predictor told the same active rows as last time.
+    settled: bool,
+}
+
+/// [`Interior::iterate`] with its argument.
+struct Iteration<'a, const NX: usize, const NU: usize> {
+    interior: &'a mut Interior<NX, NU>,
+    problem: &'a Problem<NX, NU>,
+}
+
+impl<const NX: usize, const NU: usize> Work for Iteration<'_, NX, NU> {
+    type Output = Option<Iterated>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Iterated> {
+        self.interior.iterate(self.problem)
+    }
+}
+
 impl<const NX: usize, const NU: usize> Interior<NX, NU> {
+    /// Predictor and corrector. Nothing where the method ends: without bounds, at the solution, or without positive curvature.
+    #[inline(always)]
+    fn iterate(&mut self, problem: &Problem<NX, NU>) -> Option<Iterated> {
+        self.set_targets(|_| 0.0);
+        if !self.recursion(problem, true) {
+            return None;
+        }
+        let (step, products) = self.directions(problem, 1.0);
+        let settled = self.predict_active();
+        if products.rows == 0.0 {
+            self.advance(1.0);
+            return None;
+        }
+        let mu = products.after(0.0);
+        let centring = (products.after(step) / mu).powi(2);
+        self.set_targets(|row| centring * mu - row.ds * row.dz);
+        self.recursion(problem, false);
+        let (step, products) = self.directions(problem, TO_BOUNDARY);
+        self.advance(step);
+        Some(Iterated { step, mu: products.after(step), settled })
+    }
+
     /// Hands the plan and the multipliers over.
     fn answer(&self, problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
         let mut x = problem.x_0;
@@ -184,5 +220,75 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         solution.residual = optimality::residual(problem, solution);
         solution.outcome =
             if solution.residual < RESIDUAL_MAX { Outcome::InteriorPoint } else { Outcome::MaxIterations };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::same_with_wide;
+    use crate::qp_support::{Stress, random_problem};
+
+    /// The method, and the problem to work on.
+    struct Owned<const NX: usize> {
+        interior: Interior<NX, 2>,
+        problem: Problem<NX, 2>,
+    }
+
+    impl<const NX: usize> Work for Owned<NX> {
+        type Output = (Option<Iterated>, Interior<NX, 2>);
+
+        #[inline(always)]
+        fn run(self) -> Self::Output {
+            let Self { mut interior, problem } = self;
+            (interior.iterate(&problem), interior)
+        }
+    }
+
+    /// Iterates with narrow and with wide vectors. Returns how often.
+    fn compare<const NX: usize>(stress: &Stress) -> usize {
+        let problem: Problem<NX, 2> = random_problem(stress);
+        let mut interior = Interior::new(stress.horizon);
+        let plan = vec![[0.0; 2]; stress.horizon];
+        interior.start(&problem, &plan, &mut Solution::new(stress.horizon));
+        let mut iterations = 0;
+        while iterations < 10 {
+            let fresh = || Owned { interior: interior.clone(), problem: problem.clone() };
+            let (iterated, moved) = same_with_wide(fresh);
+            if iterated.is_none() {
+                break;
+            }
+            interior = moved;
+            iterations += 1;
+        }
+        iterations
+    }
+
+    #[test]
+    fn wider_vectors_give_the_same_bits() {
+        let mut iterations = 0;
+        for seed in 0..40 {
+            let (degenerate, outside) = (seed % 2 == 0, seed % 3 == 0);
+            let stress = Stress { seed, horizon: 20, growth: 0.5, decades: 3.0, demand: 1.0, degenerate, outside };
+            iterations += compare::<5>(&stress) + compare::<7>(&stress);
+        }
+        assert!(iterations > 400, "of 800 iterations only {iterations} were made");
+    }
+
+    #[test]
+    fn products_after_a_step_are_those_of_the_rows() {
+        let rows = [(2.0, 3.0, -0.5, 1.0), (0.1, 40.0, 0.3, -20.0), (7.0, 0.01, -6.0, 0.2)];
+        let mut products = step::Complementarity::default();
+        for (s, z, ds, dz) in rows {
+            products.add(&Row { s, z, ds, dz, ..Row::default() });
+        }
+        for alpha in [0.0, 0.25, 1.0] {
+            let mean = rows.map(|(s, z, ds, dz)| (s + alpha * ds) * (z + alpha * dz)).iter().sum::<f64>() / 3.0;
+            assert!(
+                (products.after(alpha) - mean).abs() < 1e-14 * mean.abs(),
+                "{alpha}: {} {mean}",
+                products.after(alpha)
+            );
+        }
     }
 }

@@ -10,7 +10,35 @@ use nalgebra::SVector;
 /// Derivative of the distances with respect to input (upper, lower) or increment (rise, fall).
 const SIGN: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 
+/// Products of distances and multipliers along the directions: a parabola in the step length.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Complementarity {
+    /// Sums of the products here, of their slopes and of their curvatures.
+    sums: [f64; 3],
+    /// Rows that have a multiplier.
+    pub(super) rows: f64,
+}
+
+impl Complementarity {
+    #[inline(always)]
+    pub(super) fn add(&mut self, row: &Row) {
+        let [here, slope, curvature] = &mut self.sums;
+        *here += row.s * row.z;
+        *slope += row.s * row.dz + row.ds * row.z;
+        *curvature += row.ds * row.dz;
+        self.rows += 1.0;
+    }
+
+    /// Mean after a step.
+    #[inline(always)]
+    pub(super) fn after(&self, step: f64) -> f64 {
+        let [here, slope, curvature] = self.sums;
+        (here + step * (slope + step * curvature)) / self.rows
+    }
+}
+
 impl<const NX: usize, const NU: usize> Interior<NX, NU> {
+    #[inline(always)]
     pub(super) fn set_targets(&mut self, target: impl Fn(&Row) -> f64) {
         for rows in &mut self.rows {
             for row in rows.iter_mut().flatten() {
@@ -24,6 +52,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
 
     /// Tells the active rows by where the predictor drives them: to their bound, or to a zero multiplier. Returns whether
     /// they are the same as last time.
+    #[inline(always)]
     pub(super) fn predict_active(&mut self) -> bool {
         let mut settled = true;
         for rows in &mut self.rows {
@@ -39,6 +68,7 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
     /// Newton step as one recursion over differences: backwards with the barrier's curvature and the slopes at the iterate,
     /// forwards to the directions. Differences, because near the bounds the barrier's curvature times the whole input would
     /// drown the slopes in rounding.
+    #[inline(always)]
     pub(super) fn recursion(&mut self, problem: &Problem<NX, NU>, factorise: bool) -> bool {
         let N = self.u.len();
         let u_prev = problem.u_prev_clamped();
@@ -128,10 +158,14 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
         value
     }
 
-    /// Directions of distances and multipliers; returns the step length that keeps all of them positive.
-    pub(super) fn directions(&mut self, problem: &Problem<NX, NU>, fraction: f64) -> f64 {
+    /// Directions of distances and multipliers; returns the step length that keeps all of them positive, and what becomes of
+    /// their products along the way.
+    #[inline(always)]
+    pub(super) fn directions(&mut self, problem: &Problem<NX, NU>, fraction: f64) -> (f64, Complementarity) {
         let mut inverse_alpha: f64 = fraction;
+        let mut products = Complementarity::default();
         let mut limit = |row: &Row| {
+            products.add(row);
             // Divisions only where a row sets the limit, which few do.
             if -row.ds > inverse_alpha * row.s {
                 inverse_alpha = -row.ds / row.s;
@@ -165,24 +199,10 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                 }
             }
         }
-        fraction / inverse_alpha
+        (fraction / inverse_alpha, products)
     }
 
-    /// Mean product of distance and multiplier after a step along the directions, and the number of rows.
-    pub(super) fn complementarity(&self, alpha: f64) -> (f64, usize) {
-        let mut sum = 0.0;
-        let mut count = 0;
-        let mut add = |row: &Row| {
-            if row.z > 0.0 {
-                sum += (row.s + alpha * row.ds) * (row.z + alpha * row.dz);
-                count += 1;
-            }
-        };
-        self.rows.iter().flatten().flatten().for_each(&mut add);
-        self.soft.iter().flatten().for_each(&mut add);
-        (if count > 0 { sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX)) } else { 0.0 }, count)
-    }
-
+    #[inline(always)]
     pub(super) fn advance(&mut self, alpha: f64) {
         let step = |row: &mut Row| {
             row.s += alpha * row.ds;
