@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use crate::adaptation::Adapter;
-use crate::discretise::Hold;
 use crate::estimator::Estimator;
 use crate::guide::Guide;
+use crate::hold::Hold;
 use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};

@@ -6,9 +6,9 @@
 //! lags alike.
 
 use nalgebra::{SMatrix, SVector};
-use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
+use crate::hold::{Hold, ORDER};
 use crate::model::{A_X, DELTA, E_PSI, E_Y, Lpv, NU, NX, State, V_X, V_Y, YAW_RATE};
 
 /// Largest `step * rate` for one evaluation of the series [1]: its error there is 1.5^5 / 5! = 6 % of a mode that has
@@ -17,72 +17,6 @@ const STIFFNESS_MAX: f64 = 1.5;
 
 /// Most pieces into which a stiff sample is cut.
 const PIECES_MAX: u32 = 64;
-
-/// Terms of the series.
-const ORDER: usize = 4;
-
-/// What depends on the step and the lags alone.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Hold {
-    /// Step [s].
-    pub step: f64,
-    /// Time constants of the actuators [s].
-    tau: [f64; NU],
-    /// What is left of a lag's distance to its command after the step [1].
-    pub decay: [f64; NU],
-    /// Moments of what is held over the whole step.
-    held: [f64; ORDER],
-    /// Moments of the actuators' decaying distances to their commands.
-    distant: [[f64; ORDER]; NU],
-    /// What these leave of the held ones.
-    reached: [[f64; ORDER]; NU],
-}
-
-impl Hold {
-    /// A hold over `step` [s] behind lags with time constants `tau` [s]; 0 is no lag.
-    pub fn new(step: f64, tau: [f64; NU]) -> Self {
-        let h = step;
-        let held = [h, h * h / 2.0, h * h * h / 6.0, h * h * h * h / 24.0];
-        let distant = tau.map(|tau| moments(step, tau));
-        let reached = distant.map(|distant| std::array::from_fn(|k| held[k] - distant[k]));
-        Self { step, tau, decay: tau.map(|tau| decay(step, tau)), held, distant, reached }
-    }
-}
-
-/// `exp(-step / tau)`, 0 without a lag.
-pub(crate) fn decay(step: f64, tau: f64) -> f64 {
-    if tau > 0.0 { (-step / tau).exp() } else { 0.0 }
-}
-
-/// The moments `m_k = integral of (h - s)^k / k! exp(-s / tau)`.
-fn moments(step: f64, tau: f64) -> [f64; ORDER] {
-    if tau <= 0.0 {
-        return [0.0; ORDER];
-    }
-    let z = step / tau;
-    // m_k = h^(k+1) sum_j (-z)^j / (k + 1 + j)!: the forward recursion loses all digits for slow lags, the series does so for
-    // fast ones, and both hold around z = 1.
-    let mut moments = [0.0_f64; ORDER];
-    if z < 1.0 {
-        for (k, moment) in moments.iter_mut().enumerate() {
-            let mut term = (1..=k + 1).fold(1.0, |product, i| product * step / i as f64);
-            let mut j = k + 1;
-            while term.abs() > 1e-18 * moment.abs() {
-                *moment += term;
-                j += 1;
-                term *= -z / j as f64;
-            }
-        }
-    } else {
-        moments[0] = tau * (1.0 - (-z).exp());
-        let mut power = 1.0;
-        for k in 1..ORDER {
-            power *= step / k as f64;
-            moments[k] = tau * (power - moments[k - 1]);
-        }
-    }
-    moments
-}
 
 /// One sample: `x+ = Phi x + Gamma u + d`. With `N_X` of 7 the last states are what the actuators deliver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -321,6 +255,7 @@ fn compose<T: Scalar, const N_X: usize>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hold::decay;
     use crate::model::{Body, Disturbance, Input, Tyres, embed};
 
     fn system(v_x: f64) -> Lpv {

@@ -13,7 +13,8 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::discretise::{Discrete, Hold, discretise, reached};
+use crate::discretise::{Discrete, discretise, reached};
+use crate::hold::Hold;
 use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
 use crate::noise::NoiseLevel;
 use crate::trend::Trend;

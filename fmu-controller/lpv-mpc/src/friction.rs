@@ -15,7 +15,7 @@ use nalgebra::{Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::estimator;
-use crate::model::{Body, Disturbance, Input, Point, State, Tyres, V_X, V_Y, YAW_RATE, motion};
+use crate::model::{Body, Disturbance, Input, Point, State, Tyres, V_X, V_Y, YAW_RATE};
 
 /// Smallest and largest factor on the stiffness [1].
 ///
@@ -115,7 +115,7 @@ impl Given {
     pub fn by(tyres: &Tyres, x: &State, u: &Input, body: &Body) -> Self {
         let at = Point::new(*x, *u, body);
         let accelerations = |tyres: &Tyres| {
-            let (rates, _) = motion(&at, 0.0, body, tyres, &Disturbance::zeros());
+            let (rates, _) = at.motion(0.0, tyres, &Disturbance::zeros());
             // Turning with the body is no force.
             Vector2::new(rates[V_Y] + x[YAW_RATE] * x[V_X], rates[YAW_RATE])
         };

@@ -7,7 +7,7 @@
 
 use crate::Scalar;
 use crate::ahead::Road;
-use crate::discretise::Hold;
+use crate::hold::Hold;
 use crate::latency::Predicted;
 use crate::model::{A_X, Body, Disturbance, Input, V_GUARD, V_X};
 use crate::parameters::Parameters;

@@ -3,12 +3,12 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::Scalar;
-use crate::discretise::{Hold, discretise_into};
+use crate::discretise::discretise_into;
 use crate::guide::Path;
+use crate::hold::Hold;
 use crate::latency::Predicted;
 use crate::model::{
-    A_X, Body, DELTA, E_PSI, Input, NU, NX, Point, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, embed_at,
-    steady_lateral_velocity,
+    A_X, Body, DELTA, E_PSI, Input, NU, NX, Point, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE, steady_lateral_velocity,
 };
 use crate::qp::Stage;
 
@@ -17,8 +17,6 @@ pub const NX_LAGS: usize = NX + NU;
 
 /// What is the same for every stage of a plan.
 pub struct Surroundings<'a> {
-    /// The car.
-    pub body: &'a Body,
     /// Tyres at small slip, for the reference.
     pub nominal: Tyres,
     /// Period and lags.
@@ -48,12 +46,12 @@ impl<'a, const N_X: usize> From<&'a mut Stage<N_X, NU>> for Linear<'a, f64, N_X>
 ///
 /// The frozen system then is a second-order approximation of the varying one.
 #[inline(always)]
-pub fn middle<T: Scalar, const N_X: usize>(
+pub fn middle<'a, T: Scalar, const N_X: usize>(
     before: &SVector<T, N_X>,
     after: &SVector<T, N_X>,
     u: &Input<T>,
-    body: &Body,
-) -> Point<T> {
+    body: &'a Body,
+) -> Point<'a, T> {
     let middle = (before + after) * T::from(0.5);
     let acting = if N_X == NX { *u } else { Input::from([middle[NX + DELTA], middle[NX + A_X]]) };
     Point::new(vehicle_part(&middle), acting, body)
@@ -62,16 +60,16 @@ pub fn middle<T: Scalar, const N_X: usize>(
 /// Fills the stage at a scheduling point.
 #[inline(always)]
 pub fn linearise<T: Scalar, const N_X: usize>(
-    at: &Point<T>,
+    at: &Point<'_, T>,
     path: &Path<T>,
     tyres: &Tyres<T>,
     around: &Surroundings<'_>,
     Linear { A, B, d, x_ref }: Linear<'_, T, N_X>,
 ) {
-    let Surroundings { body, nominal, hold } = around;
+    let Surroundings { nominal, hold } = around;
     let kappa = (path.kappa[0] + path.kappa[1]) * 0.5;
-    discretise_into(&embed_at(at, kappa, body, tyres, &path.disturbance), hold, A, B, d);
-    *x_ref = steady_state(path.v_x, path.kappa[1], body, nominal);
+    discretise_into(&at.embed(kappa, tyres, &path.disturbance), hold, A, B, d);
+    *x_ref = steady_state(path.v_x, path.kappa[1], at.body, nominal);
 }
 
 /// Reference of the states: steady cornering at the wanted speed without lateral error.

@@ -48,10 +48,11 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use crate::Parameters;
-    use crate::discretise::{Discrete, Hold, discretise_into};
+    use crate::discretise::{Discrete, discretise_into};
     use crate::grip::TANGENT_FLOOR;
+    use crate::hold::Hold;
     use crate::jordan::{Belief, Measured, Memory, Network};
-    use crate::model::{Disturbance, Input, Point, State, embed_at};
+    use crate::model::{Disturbance, Input, Point, State};
 
     /// What the model of a stage consists of.
     struct Stage<'a> {
@@ -73,7 +74,7 @@ mod tests {
             let (memory, belief) = network.linearise(&memory, &measured);
             let body = Parameters::default().body();
             let (tyres, point) = (belief.tangent(TANGENT_FLOOR), Point::new(x, u, &body));
-            let lpv = embed_at(&point, 0.02, &body, &tyres, &Disturbance::zeros());
+            let lpv = point.embed(0.02, &tyres, &Disturbance::zeros());
             let mut sample = Discrete::zeros();
             let Discrete { Phi, Gamma, d } = &mut sample;
             discretise_into(&lpv, hold, Phi, Gamma, d);

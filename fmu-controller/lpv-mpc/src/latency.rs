@@ -7,8 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
-use crate::discretise::decay;
-use crate::model::{Body, Input, NU, Point, State, Tyres, V_X, fastest_rate, motion};
+use crate::hold::decay;
+use crate::model::{Body, Input, NU, Point, State, Tyres, V_X, fastest_rate};
 use crate::trend::Trend;
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
@@ -132,7 +132,7 @@ impl Latency {
                 let disturbance = trend.after(now - self.time + (done + 0.5) * h);
                 let f = |x: &State<T>, u: &Input, distance: T| {
                     let kappa = kappa(distance);
-                    motion(&Point::new(*x, u.map(T::from), body), kappa, body, tyres, &disturbance)
+                    Point::new(*x, u.map(T::from), body).motion(kappa, tyres, &disturbance)
                 };
                 at = self.runge_kutta(&at, &command, h, f);
                 done += 1.0;

@@ -38,6 +38,7 @@ mod feedforward;
 mod friction;
 mod grip;
 mod guide;
+pub mod hold;
 mod horizon;
 pub mod jordan;
 mod ladder;

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::caution::caution;
-use crate::discretise::Hold;
 use crate::feedforward::{Before, FeedForward, Past};
 use crate::guide::Guide;
+use crate::hold::Hold;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state, vehicle_part};
 use crate::lanes::{Work, widest};
 use crate::latency::Predicted;
@@ -230,7 +230,7 @@ impl<const N_X: usize> Mpc<N_X> {
         body: &Body,
         tyres: &mut impl TyreModel,
     ) {
-        let around = Surroundings { body, nominal: tyres.nominal(), hold };
+        let around = Surroundings { nominal: tyres.nominal(), hold };
         tyres.restart();
         self.fastest = 0.0;
         self.schedule.take(&self.plan);

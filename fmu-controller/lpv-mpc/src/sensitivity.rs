@@ -11,10 +11,10 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::adaptation::Adapter;
-use crate::discretise::Hold;
 use crate::estimator::Estimator;
 use crate::feedforward::{Before, FeedForward};
 use crate::guide::Guide;
+use crate::hold::Hold;
 use crate::horizon::{Linear, Surroundings, full_state, linearise, middle, vehicle_part};
 use crate::jordan::Memory;
 use crate::latency::Latency;
@@ -106,7 +106,7 @@ pub(crate) fn along<const N_X: usize>(
     let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &trend);
     let since = snapshot.step + p.input_delay;
     let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, hold), &trend);
-    let around = Surroundings { body, nominal: adapter.nominal(), hold };
+    let around = Surroundings { nominal: adapter.nominal(), hold };
 
     let mut change = Perturbation::new(mpc.plan.u.len());
     let x_0 = full_state::<Dual64, N_X>(&at);

@@ -7,8 +7,8 @@
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use crate::discretise::Hold;
 use crate::guide::Path;
+use crate::hold::Hold;
 use crate::horizon::{Linear, Surroundings, linearise};
 use crate::lanes::{Work, widest};
 use crate::model::{
@@ -66,7 +66,7 @@ impl Terminal {
             return;
         }
         let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x, disturbance: Disturbance::zeros() };
-        let around = Surroundings { body, nominal: *tyres, hold };
+        let around = Surroundings { nominal: *tyres, hold };
         let mut x = State::zeros();
         x[V_X] = v_x;
         let mut end = Stage::<N_X, NU>::default();
@@ -174,7 +174,8 @@ impl<const NZ: usize> Work for Doubling<NZ> {
 mod tests {
     use super::*;
     use crate::Parameters;
-    use crate::discretise::{Hold, discretise};
+    use crate::discretise::discretise;
+    use crate::hold::Hold;
     use crate::model::{Disturbance, Input, State, embed};
 
     fn model(v_x: f64) -> (SMatrix<f64, 5, 5>, SMatrix<f64, 5, 2>) {
