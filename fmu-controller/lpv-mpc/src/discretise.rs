@@ -256,13 +256,13 @@ fn compose<T: Scalar, const N_X: usize>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) 
 mod tests {
     use super::*;
     use crate::hold::decay;
-    use crate::model::{Body, Disturbance, Input, Tyres, embed};
+    use crate::model::{Body, Disturbance, Input, Point, Tyres};
 
     fn system(v_x: f64) -> Lpv {
         let body: Body = crate::Parameters::default().body();
         let x = State::from([v_x, 0.3, 0.2, 0.4, 0.1]);
         let tyres = Tyres { c_f: 1.0e5, c_r: 7.6e4, f_f0: 300.0, f_r0: -200.0 };
-        embed(&x, &Input::from([0.05, 1.0]), 0.02, &body, &tyres, &Disturbance::from([0.1, -0.2, 0.3]))
+        Point::new(x, Input::from([0.05, 1.0]), &body).embed(0.02, &tyres, &Disturbance::from([0.1, -0.2, 0.3]))
     }
 
     /// Independent route: classic Runge-Kutta steps on the continuous equations with lags, 2000 per sample.

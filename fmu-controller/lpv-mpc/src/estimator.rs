@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::Scalar;
 use crate::discretise::{Discrete, discretise, reached};
 use crate::hold::Hold;
-use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, State, Tyres, V_X, V_Y, YAW_RATE, embed};
+use crate::model::{Body, Disturbance, E_PSI, E_Y, Input, NX, Point, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::noise::NoiseLevel;
 use crate::trend::Trend;
 
@@ -207,7 +207,7 @@ impl<T: Scalar> Estimator<T> {
     fn predict(&mut self, kappa: T, input: &Input, duration: f64, body: &Body, tyres: &Tyres<T>) {
         let hold = Hold::new(duration, [0.0, 0.0]);
         let input = input.map(T::from);
-        let around = |x: &State<T>| embed(x, &input, kappa, body, tyres, &self.trend.now);
+        let around = |x: &State<T>| Point::new(*x, input, body).embed(kappa, tyres, &self.trend.now);
         // Scheduled in the middle of the step, as the stages of the plan are.
         let end = reached(&around(&self.x), &self.x, &input, &hold);
         let Discrete { Phi, Gamma, d } = discretise(&around(&((self.x + end) * T::from(0.5))), &hold);

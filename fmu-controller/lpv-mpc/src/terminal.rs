@@ -176,12 +176,12 @@ mod tests {
     use crate::Parameters;
     use crate::discretise::discretise;
     use crate::hold::Hold;
-    use crate::model::{Disturbance, Input, State, embed};
+    use crate::model::{Disturbance, Input, Point, State};
 
     fn model(v_x: f64) -> (SMatrix<f64, 5, 5>, SMatrix<f64, 5, 2>) {
         let p = Parameters::default();
         let x = State::from([v_x, 0.0, 0.0, 0.0, 0.0]);
-        let lpv = embed(&x, &Input::zeros(), 0.0, &p.body(), &p.nominal_tyres(), &Disturbance::zeros());
+        let lpv = Point::new(x, Input::zeros(), &p.body()).embed(0.0, &p.nominal_tyres(), &Disturbance::zeros());
         let sample = discretise(&lpv, &Hold::new(p.t_s, [0.0, 0.0]));
         (sample.Phi, sample.Gamma)
     }

@@ -238,13 +238,13 @@ mod tests {
 
     #[test]
     fn the_corrected_matrices_are_those_of_the_controller() {
-        use lpv_mpc::model::{Disturbance, Input, embed};
+        use lpv_mpc::model::{Disturbance, Input, Point};
         let mpc = PaperMpc::new(Printed::default(), 0.82);
         // Sideslip so small that the paper's small-angle form is the controller's exact one.
         let x = SVector::from([14.0, 1e-4, 1e-4, 0.02, 0.01]);
         let (delta, kappa) = (0.05, 0.02);
-        let lpv =
-            embed(&x, &Input::from([delta, 0.0]), kappa, &mpc.p.body(), &mpc.p.nominal_tyres(), &Disturbance::zeros());
+        let (body, tyres) = (mpc.p.body(), mpc.p.nominal_tyres());
+        let lpv = Point::new(x, Input::from([delta, 0.0]), &body).embed(kappa, &tyres, &Disturbance::zeros());
         let mut whole = SMatrix::<f64, NZ, NZ>::zeros();
         whole.fixed_view_mut::<NX, NX>(0, 0).copy_from(&lpv.A);
         whole.fixed_view_mut::<NX, NU>(0, NX).copy_from(&lpv.B);

@@ -1,8 +1,8 @@
 //! The prediction model: nonlinear single-track equations in path coordinates and their exact LPV embedding.
 //!
-//! [`Point::motion`] states the equations of motion, [`Point::embed`] writes the same right-hand side as `A(psi) x + B(psi) u + d`.
-//! The two agree to rounding for every state and for any tyre whose axle force is written `F = F_0 + C alpha`: a secant
-//! stiffness has `F_0 = 0`, a tangent model carries the rest of the force in `F_0`.
+//! [`Point::motion`] states the equations of motion, [`Point::embed`] writes the same right-hand side as
+//! `A(psi) x + B(psi) u + d`. The two agree to rounding for every state and for any tyre whose axle force is written
+//! `F = F_0 + C alpha`: a secant stiffness has `F_0 = 0`, a tangent model carries the rest of the force in `F_0`.
 
 mod point;
 
@@ -120,19 +120,6 @@ pub fn derivative<T: Scalar>(
     Point::new(*x, *u, body).motion(kappa, tyres, disturbance).0
 }
 
-/// The LPV embedding at the scheduling point `(x, u, kappa)`, [`Point::embed`].
-#[inline(always)]
-pub fn embed<T: Scalar>(
-    x: &State<T>,
-    u: &Input<T>,
-    kappa: T,
-    body: &Body,
-    tyres: &Tyres<T>,
-    disturbance: &Disturbance<T>,
-) -> Lpv<T> {
-    Point::new(*x, *u, body).embed(kappa, tyres, disturbance)
-}
-
 /// Rate of the fastest lateral mode for small slip, a bound by the traces of the velocity and the yaw equation [1/s].
 pub fn fastest_rate<T: Scalar>(v_x: f64, body: &Body, tyres: &Tyres<T>) -> f64 {
     let Body { m, i_z, l_f, l_r, .. } = *body;
@@ -169,7 +156,7 @@ mod tests {
             let tyres =
                 Tyres { c_f: draw(1e3, 2e5), c_r: draw(1e3, 2e5), f_f0: draw(-5e3, 5e3), f_r0: draw(-5e3, 5e3) };
             let disturbance = Disturbance::from([draw(-2.0, 2.0), draw(-2.0, 2.0), draw(-1.0, 1.0)]);
-            let Lpv { A, B, d } = embed(&x, &u, kappa, &body, &tyres, &disturbance);
+            let Lpv { A, B, d } = Point::new(x, u, &body).embed(kappa, &tyres, &disturbance);
             let exact = derivative(&x, &u, kappa, &body, &tyres, &disturbance);
             let residual = A * x + B * u + d - exact;
             for row in 0..NX {
@@ -190,7 +177,7 @@ mod tests {
         let x = State::from([15.0, 0.0, 0.0, 0.0, 0.0]);
         let u = Input::zeros();
         let tyres = Tyres::secant(1.0e5, 7.6e4);
-        let Lpv { A, B, .. } = embed(&x, &u, 0.0, &body(), &tyres, &Disturbance::zeros());
+        let Lpv { A, B, .. } = Point::new(x, u, &body()).embed(0.0, &tyres, &Disturbance::zeros());
         let rank = |A: &SMatrix<f64, NX, NX>| {
             let mut blocks = SMatrix::<f64, NX, { NX * NU }>::zeros();
             let mut power = B;
