@@ -4,8 +4,8 @@
 //! its measurements are recorded; each bench replays them through whole controllers that have begun before, one sample per
 //! communication step. `quadratic programme` is the structured solver alone on the problems of the same drive with ideal
 //! actuators, warm-started the same way, and few enough of them to stay in the processor's cache: in a step the problem has
-//! just been written. Everything else of a step is measured with it: the tyres, the prediction over the latency, the linear models
-//! of all stages and their discretisation, the outputs.
+//! just been written. Everything else of a step is measured with it: the tyres, the prediction over the latency, the linear
+//! models of all stages and their discretisation, the outputs.
 //!
 //! First come the ratios that the question asks for, from turns that all kinds of step take one after the other, so that a
 //! machine that slows down slows all of them; each kind counts with its best turn. Criterion's times follow, per sample.

@@ -60,7 +60,9 @@ impl<T: Scalar> Road<T> {
             s[i] = s[i - 1] + ((v_x[i - 1] + v_x[i]) * 0.5).larger(PACE_MIN) * p.t_s;
         }
         let unknown = T::from(p.mu.max(FRICTION_MIN));
-        let mu = mu.map(|mu| if mu.re() > 0.0 { mu.larger(FRICTION_MIN) } else { unknown });
+        // Infinite friction is no friction that is known either; between two such places it would be no number.
+        let is_known = |mu: f64| mu > 0.0 && mu.is_finite();
+        let mu = mu.map(|mu| if is_known(mu.re()) { mu.larger(FRICTION_MIN) } else { unknown });
         let limit = permitted(&s, &kappa, &v_x, &mu, p);
         Self { s, kappa, v_x, mu, limit, period: p.t_s }
     }
@@ -207,5 +209,7 @@ mod tests {
         assert_eq!(road.friction(30.0 * step), 0.4);
         let (_, _, limit) = road.at(&road.find(30.0 * step, 0));
         assert!((limit - (p.grip_max * 0.4 * p.g / 0.02).sqrt()).abs() < 1e-12);
+        let endless = Road::new(rows(|i| [0.02, 20.0, if i < 20 { f64::INFINITY } else { 0.4 }]), &p);
+        assert_eq!(endless.friction(5.5 * step), p.mu);
     }
 }

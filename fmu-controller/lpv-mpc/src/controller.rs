@@ -178,7 +178,8 @@ impl Controller {
     /// plan is made for that moment (and the actuators' delay).
     ///
     /// # Errors
-    /// [`Error::Step`] for a step that is not positive and finite; the controller is as before then.
+    /// [`Error::Step`] for a step that is not positive and finite, [`Error::Time`] for a time that is not finite; the controller
+    /// is as before then.
     pub fn advance(&mut self, t: f64, h: f64, inputs: &Inputs) -> Result<(), Error> {
         self.advance_with(t, h, |_| (0.0, Cow::Borrowed(inputs)))
     }
@@ -200,8 +201,11 @@ impl Controller {
         h: f64,
         measure: impl Fn(f64) -> (f64, Cow<'a, Inputs>),
     ) -> Result<(), Error> {
-        if !(h > 0.0 && h.is_finite() && t.is_finite()) {
+        if !(h > 0.0 && h.is_finite()) {
             return Err(Error::Step(h));
+        }
+        if !t.is_finite() {
+            return Err(Error::Time(t));
         }
         self.sampled = 0;
         let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);

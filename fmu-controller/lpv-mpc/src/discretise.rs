@@ -15,8 +15,9 @@ use crate::model::{A_X, DELTA, E_PSI, E_Y, Lpv, NU, NX, State, V_X, V_Y, YAW_RAT
 /// decayed to 22 %; it would be unstable from 2.78 on.
 const STIFFNESS_MAX: f64 = 1.5;
 
-/// Most pieces into which a stiff sample is cut.
-const PIECES_MAX: u32 = 64;
+/// Most halvings of a stiff sample. They keep the series stable for 1.5e9 time constants in a sample; each costs a binary digit
+/// of the slow modes, of which twenty-two are left then.
+const HALVINGS_MAX: i32 = 30;
 
 /// One sample: `x+ = Phi x + Gamma u + d`. With `N_X` of 7 the last states are what the actuators deliver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,8 +136,8 @@ pub fn discretise_into<T: Scalar, const N_X: usize>(
     let stiffness = stiffness(lpv, hold);
     if stiffness > STIFFNESS_MAX {
         #[expect(clippy::cast_possible_truncation, reason = "clamped to a small count before the cast")]
-        let pieces = (stiffness / STIFFNESS_MAX).ceil().min(f64::from(PIECES_MAX)) as u32;
-        let whole = compose(lpv, hold, pieces);
+        let halvings = (stiffness / STIFFNESS_MAX).log2().ceil().min(f64::from(HALVINGS_MAX)) as i32;
+        let whole = compose(lpv, hold, halvings);
         (*Phi, *Gamma, *d) = (whole.Phi, whole.Gamma, whole.d);
     } else {
         one_piece(lpv, hold, Phi, Gamma, d);
@@ -235,21 +236,17 @@ fn extended<T: Scalar, const N: usize, const N_X: usize>(x: &SVector<T, N>) -> S
     SVector::from_fn(|i, _| if i < N { x[i] } else { T::zero() })
 }
 
-/// The hold cut into equal pieces and put together again, for modes too fast for the series.
+/// The hold halved until the series resolves it, and doubled again, for modes too fast for the series.
 #[cold]
-fn compose<T: Scalar, const N_X: usize>(lpv: &Lpv<T>, hold: &Hold, pieces: u32) -> Discrete<T, N_X> {
-    let mut piece = Discrete::zeros();
-    let Discrete { Phi, Gamma, d } = &mut piece;
-    one_piece(lpv, &Hold::new(hold.step / f64::from(pieces), hold.tau), Phi, Gamma, d);
-    let mut whole = Discrete { Phi: SMatrix::identity(), ..Discrete::zeros() };
-    for _ in 0..pieces {
-        whole = Discrete {
-            Phi: piece.Phi * whole.Phi,
-            Gamma: piece.Phi * whole.Gamma + piece.Gamma,
-            d: piece.Phi * whole.d + piece.d,
-        };
+fn compose<T: Scalar, const N_X: usize>(lpv: &Lpv<T>, hold: &Hold, halvings: i32) -> Discrete<T, N_X> {
+    let mut sample = Discrete::zeros();
+    let Discrete { Phi, Gamma, d } = &mut sample;
+    one_piece(lpv, &Hold::new(hold.step * 0.5_f64.powi(halvings), hold.tau), Phi, Gamma, d);
+    for _ in 0..halvings {
+        let Discrete { Phi, Gamma, d } = sample;
+        sample = Discrete { Phi: Phi * Phi, Gamma: Phi * Gamma + Gamma, d: Phi * d + d };
     }
-    whole
+    sample
 }
 
 #[cfg(test)]
@@ -340,6 +337,26 @@ mod tests {
             assert!(block.norm() < 0.1, "v_x {v_x}: {block}");
             // 0.2 s is eight time constants of the slowest lateral mode; each piece leaves at most 6 % of what is left.
             assert!(error_of_one_sample(v_x, 0.2, [0.1, 0.1]) < 2e-2, "v_x {v_x}");
+        }
+    }
+
+    #[test]
+    fn after_very_many_time_constants_the_lateral_motion_is_steady() {
+        // At 3 m/s the fastest mode has 40 1/s; the longest communication step is 10 s.
+        let (lpv, u) = (system(3.0), Input::from([0.05, 1.0]));
+        for step in [5.0, 10.0, 1e6] {
+            let Discrete { Phi, Gamma, d } = discretise(&lpv, &Hold::new(step, [0.0; NU]));
+            let block = Phi.fixed_view::<2, 2>(V_Y, V_Y);
+            // The slower lateral mode has 16 1/s: e^-80 is left after 5 s.
+            assert!(block.norm() < 1e-20, "{step} s: {block}");
+            let [a, b, c, e] = [(V_Y, V_Y), (V_Y, YAW_RATE), (YAW_RATE, V_Y), (YAW_RATE, YAW_RATE)].map(|i| lpv.A[i]);
+            let [f, g] = [V_Y, YAW_RATE].map(|row| -(lpv.B[(row, DELTA)] * u[DELTA] + lpv.d[row]));
+            // Cramer's rule on the equations of the equilibrium.
+            let steady = [(f * e - b * g) / (a * e - b * c), (a * g - f * c) / (a * e - b * c)];
+            let reached = Gamma * u + d;
+            for (row, steady) in [(V_Y, steady[0]), (YAW_RATE, steady[1])] {
+                assert!((reached[row] - steady).abs() < 1e-10 * steady.abs(), "{step} s: {} {steady}", reached[row]);
+            }
         }
     }
 

@@ -24,6 +24,9 @@ pub enum Error {
     /// A communication step that no controller can take.
     #[error("communication step must be positive and finite, got {0} s")]
     Step(f64),
+    /// A time at which no communication step begins.
+    #[error("time must be finite, got {0} s")]
+    Time(f64),
     /// A network file that is not the JSON that it should be.
     #[error("network file is not readable: {0}")]
     NetworkUnreadable(String),

@@ -45,6 +45,7 @@ pub struct Guide<'a, T: Scalar> {
     /// The fastest and the slowest that the car can be.
     reach: [Reach<T>; 2],
     course: Course<T>,
+    /// Period of the plan [s].
     period: f64,
 }
 

@@ -32,6 +32,14 @@ pub fn widest<W: Work>(work: W) -> W::Output {
     Arch::new().dispatch(Lanes(work))
 }
 
+/// `y += a x`, the shape that the compiler turns into packed instructions.
+#[inline(always)]
+pub fn axpy<const M: usize>(a: f64, x: &[f64; M], y: &mut [f64; M]) {
+    for m in 0..M {
+        y[m] += a * x[m];
+    }
+}
+
 /// What comes of work that gives the same, to the last bit, with narrow and with wide vectors.
 #[cfg(test)]
 pub fn same_with_wide<W: Work<Output: std::fmt::Debug>>(mut work: impl FnMut() -> W) -> W::Output {

@@ -15,6 +15,10 @@ use crate::trend::Trend;
 /// that mode, and far less of the slow ones that carry the car.
 const STEP_RATE_MAX: f64 = 0.5;
 
+/// Most integration steps of a prediction [1], a millisecond's work. The stiffest tyre preset takes one for each 12 ms. A car
+/// whose modes need more than this is not followed any more; its plan is refused where that shows.
+const STEPS_MAX: f64 = 1e4;
+
 /// Times closer than this are one [s]: importers add up steps in floating point.
 const SAME_TIME: f64 = 1e-9;
 
@@ -119,7 +123,7 @@ impl Latency {
         trend: &Trend<T>,
     ) -> Predicted<T> {
         let end = self.time + step + self.delay;
-        let rate = fastest_rate(x[V_X].re(), body, tyres);
+        let rate = fastest_rate(x[V_X].re(), body, tyres).min(STEPS_MAX * STEP_RATE_MAX / (end - self.time));
         let mut at = Predicted { x: *x, distance: T::zero(), actual: self.actual };
         let mut now = self.time;
         while now < end - SAME_TIME {
@@ -249,6 +253,22 @@ mod tests {
             (0..3000).map(|k| 0.5e-5 * (response(f64::from(k) * 1e-5) + response(f64::from(k + 1) * 1e-5))).sum();
         assert!((mean[0] - sum / 0.04).abs() < 1e-10, "{mean}");
         assert!((mean[1] - 2.0 * 0.75).abs() < 1e-12, "{mean}");
+    }
+
+    #[test]
+    fn an_impossible_car_does_not_hold_the_step_up() {
+        // 1e10 1/s: without a limit nothing would come of this within minutes.
+        let p = Parameters { c_f_nominal: 1e10, c_r_nominal: 1e10, m: 1.0, i_z: 1.0, ..Parameters::default() };
+        let latency = Latency::new(0.0, 0.5, [0.0; 2], 0.033);
+        let calls = std::cell::Cell::new(0);
+        let kappa = |_| {
+            calls.set(calls.get() + 1);
+            0.01
+        };
+        let x = State::from([15.0, 0.1, 0.05, 0.2, 0.02]);
+        let trend = Trend::steady(Disturbance::zeros());
+        latency.predict(&x, 0.5, kappa, &p.body(), &p.nominal_tyres(), &trend);
+        assert_eq!(calls.get(), 4 * 10_000, "four evaluations a step");
     }
 
     #[test]

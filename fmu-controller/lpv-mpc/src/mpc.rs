@@ -304,22 +304,43 @@ mod tests {
     use super::*;
     use crate::qp_support::{Stress, random_problem};
 
-    #[test]
-    fn what_the_structured_solver_gives_up_on_the_second_one_answers() {
-        let stress = Stress {
-            seed: 3_394_388_587_556_721_806,
-            horizon: 6,
-            growth: -0.886_823_979_581_132_5,
-            decades: 4.873_882_601_602_099,
-            demand: 0.123_674_979_757_486_06,
-            degenerate: false,
-            outside: false,
-        };
+    /// Whether the structured solver gives a problem up; then the second one must answer.
+    fn gives_up(stress: &Stress) -> bool {
         let mut mpc = Mpc::<NX>::new(&Parameters { horizon: stress.horizon, ..Parameters::default() });
-        mpc.problem = random_problem(&stress);
+        mpc.problem = random_problem(stress);
         mpc.structured.solve(&mpc.problem, &mut mpc.solution);
-        assert_eq!(mpc.solution.outcome, Outcome::MaxIterations, "the case must be one");
+        if mpc.solution.outcome != Outcome::MaxIterations {
+            return false;
+        }
         assert!(mpc.solve());
         assert_eq!(mpc.solution.outcome, Outcome::SecondSolver);
+        true
+    }
+
+    #[test]
+    fn what_the_structured_solver_gives_up_on_the_second_one_answers() {
+        // Two in a hundred thousand problems of the comparison with Clarabel. Powers differ in the last digit between
+        // platforms, and either one may then be solved after all.
+        let given_up = [
+            gives_up(&Stress {
+                seed: 3_394_388_587_556_721_806,
+                horizon: 6,
+                growth: -0.886_823_979_581_132_5,
+                decades: 4.873_882_601_602_099,
+                demand: 0.123_674_979_757_486_06,
+                degenerate: false,
+                outside: false,
+            }),
+            gives_up(&Stress {
+                seed: 6_240_484_219_870_017_512,
+                horizon: 10,
+                growth: -1.430_460_764_880_228_8,
+                decades: 4.964_296_097_105_858,
+                demand: 0.301_090_680_060_587_53,
+                degenerate: true,
+                outside: false,
+            }),
+        ];
+        assert!(given_up.contains(&true), "neither is such a problem any more");
     }
 }

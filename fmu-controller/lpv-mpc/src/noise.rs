@@ -63,7 +63,9 @@ impl NoiseLevel {
     pub fn update(&mut self, duration: f64) {
         let gain = (duration / MEMORY).max(1.0 / (f64::from(self.samples) + FIRST)).min(1.0);
         self.samples = self.samples.saturating_add(1);
-        self.share = (self.share * (gain * self.surprise).exp()).clamp(SHARE_MIN, 1.0);
+        let share = self.share * (gain * self.surprise).exp();
+        // What is no number must not stay: it would be the level of all samples to come.
+        self.share = if share.is_nan() { 1.0 } else { share.clamp(SHARE_MIN, 1.0) };
         self.surprise = 0.0;
     }
 }
@@ -143,6 +145,16 @@ mod tests {
             level.update(PERIOD);
         }
         assert!(level.share() < 0.03, "{}", level.share());
+    }
+
+    #[test]
+    fn what_is_no_number_leaves_the_noise_as_told() {
+        let mut level = NoiseLevel { share: 0.1, samples: 1000, surprise: 0.0 };
+        level.observe(f64::NAN, f64::NAN, 0.1);
+        level.update(PERIOD);
+        assert_eq!(level.share(), 1.0);
+        level.update(PERIOD);
+        assert_eq!(level.share(), 1.0);
     }
 
     #[test]

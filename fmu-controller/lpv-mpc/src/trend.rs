@@ -38,7 +38,7 @@ const BOUND: f64 = 2.0;
 pub struct Trend<T: Scalar = f64> {
     /// The acceleration now [m/s2, m/s2, rad/s2].
     pub now: Disturbance<T>,
-    /// Its change [1/s].
+    /// Its change [m/s3, m/s3, rad/s3].
     slope: Disturbance<T>,
 }
 

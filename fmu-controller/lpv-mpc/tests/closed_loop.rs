@@ -172,5 +172,9 @@ fn a_step_that_is_no_step_is_refused() {
     for h in [0.0, -0.1, f64::NAN, f64::INFINITY] {
         assert!(controller.advance(0.0, h, &Inputs::default()).is_err(), "{h}");
     }
+    for t in [f64::NAN, f64::INFINITY] {
+        let error = controller.advance(t, 0.033, &Inputs::default()).unwrap_err().to_string();
+        assert!(error.starts_with("time must be finite"), "{error}");
+    }
     assert_eq!(controller.samples(), 0);
 }

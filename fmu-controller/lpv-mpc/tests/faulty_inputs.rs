@@ -3,7 +3,7 @@
 
 mod loop_support;
 
-use loop_support::{Loop, slalom, straight};
+use loop_support::{Loop, slalom, straight, turn};
 use lpv_mpc::model::{A_X, DELTA, E_PSI, E_Y, Input, State, V_X, V_Y, YAW_RATE};
 use lpv_mpc::{Controller, Estimation, Inputs, Parameters, Status};
 use rand::{RngExt, SeedableRng};
@@ -104,6 +104,44 @@ fn one_spoiled_sample_spoils_no_other() {
                 assert!(status == Status::Optimal || k == 5, "{i}, {estimation:?}, sample {k}: {status:?}");
             }
         }
+    }
+}
+
+#[test]
+fn a_huge_value_before_a_lost_sensor_does_not_stay() {
+    for spoils in [
+        [|inputs: &mut Inputs| inputs.v_x = 1e40, |inputs: &mut Inputs| inputs.v_x = f64::NAN],
+        [|inputs: &mut Inputs| inputs.v_y = 1e100, |inputs: &mut Inputs| inputs.e_y = f64::NAN],
+    ] {
+        let road = Loop::new(Parameters::default(), slalom);
+        let mut controller = Controller::new(Parameters::default(), 0.0).unwrap();
+        for k in 0..100 {
+            let t = f64::from(k) * 0.033;
+            let mut inputs = road.inputs(t, &State::from([15.0, 0.0, 0.0, 0.0, 0.0]));
+            if let Some(spoil) = (k as usize).checked_sub(20).and_then(|after| spoils.get(after)) {
+                spoil(&mut inputs);
+            }
+            controller.advance(t, 0.033, &inputs).unwrap();
+            let status = controller.output().status;
+            // This car does not obey, so the filter may doubt what it measures.
+            assert!(k < 30 || status <= Status::Estimated, "sample {k}: {status:?}");
+        }
+    }
+}
+
+#[test]
+fn a_car_that_may_steer_again_plans_as_quickly_as_one_that_always_could() {
+    let parameters = Parameters::default();
+    let mut controller = Controller::new(parameters.clone(), 0.0).unwrap();
+    for k in 0..60 {
+        let t = f64::from(k) * parameters.t_s;
+        // Standing for a second, with the steering held, then told to drive off along a bend.
+        let speed = if k < 30 { 0.0 } else { 5.0 };
+        let road = Loop { speed, ..Loop::new(parameters.clone(), turn) };
+        controller.advance(t, parameters.t_s, &road.inputs(t, &State::zeros())).unwrap();
+        let output = controller.output();
+        // The acceleration's bounds take a few sweeps where the speed begins to be wanted.
+        assert!(output.iterations <= 4, "sample {k}: {} iterations", output.iterations);
     }
 }
 

@@ -184,9 +184,11 @@ fn inputs_without_room_stay_where_they_are() {
 #[test]
 fn data_without_sense_is_refused_by_both_solvers() {
     type Spoil = fn(&mut Problem<2, 1>);
-    let refused: [(&str, Spoil); 10] = [
+    let refused: [(&str, Spoil); 12] = [
         ("no number in A", |p| p.stages[3].A[(0, 1)] = f64::NAN),
         ("infinite d", |p| p.stages[9].d[0] = f64::INFINITY),
+        ("no number in d, the input held", |p| (p.stages[5].d[1], p.du_max[0]) = (f64::NAN, 0.0)),
+        ("infinite d, the input a single point", |p| (p.stages[0].d[1], p.u_min[0]) = (f64::INFINITY, p.u_max[0])),
         ("no number in the state", |p| p.x_0[1] = f64::NAN),
         ("infinite input before", |p| p.u_prev[0] = f64::NEG_INFINITY),
         ("negative weight", |p| p.q[0] = -1.0),

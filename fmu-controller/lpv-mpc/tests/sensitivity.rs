@@ -81,8 +81,8 @@ fn compare_from(mut controller: Controller, inputs: impl Fn(f64) -> Inputs) {
             assert_eq!(after.output().status, Status::Optimal);
             for (name, direction) in directions() {
                 let exact = quantities(&after.along(&direction).unwrap());
-                // Central differences: third derivatives times 1e-12, rounding of 1e-16 times a gain over 1e-6, and few bends of the
-                // speed limits within.
+                // Central differences: third derivatives times 1e-12, rounding of 1e-16 times a gain over 1e-6, and few bends
+                // of the speed limits within.
                 let eps = 1e-6;
                 let ahead = quantities(advanced(&controller, t, &at.moved(&direction, eps)).output());
                 let behind = quantities(advanced(&controller, t, &at.moved(&direction, -eps)).output());

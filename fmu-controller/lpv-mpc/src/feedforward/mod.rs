@@ -67,6 +67,7 @@ pub struct Before<T: Scalar> {
 /// Follows the path along the stages of a plan.
 pub struct FeedForward<'a, T: Scalar> {
     body: &'a Body,
+    /// Period of the plan [s].
     period: f64,
     past: Option<Past>,
     before: Before<T>,

@@ -6,6 +6,7 @@ use std::mem;
 use super::document::{Layer, Scaling};
 use super::sigmoid::{TO_EXPONENT, logistic_lanes};
 use super::{FEEDBACK, INPUTS_ACCELERATIONS};
+use crate::lanes::axpy;
 
 /// Largest width of a layer, inputs included; the paper has 8.
 pub const WIDTH_MAX: usize = 32;
@@ -30,14 +31,6 @@ pub type Direction = [(usize, f64)];
 type Block = [f64; LANES];
 /// The values of a layer of at most `B` blocks.
 type Values<const B: usize> = [Block; B];
-
-/// `y += a x`, side by side.
-#[inline(always)]
-fn axpy(a: f64, x: &Block, y: &mut Block) {
-    for lane in 0..LANES {
-        y[lane] += a * x[lane];
-    }
-}
 
 /// `x y`, side by side.
 #[inline(always)]

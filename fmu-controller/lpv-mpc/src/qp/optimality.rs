@@ -3,7 +3,8 @@
 use super::{Problem, Solution, Stage};
 use nalgebra::SVector;
 
-/// Sets the costates of a plan: λ_N = 2 W_N (x_N - x_ref_N) + soft term, λ_i = A_i' λ_(i+1) + 2 W_i (x_i - x_ref_i) + soft term.
+/// Sets the costates of a plan: λ_N = 2 W_N (x_N - x_ref_N) + soft term,
+/// λ_i = A_i' λ_(i+1) + 2 W_i (x_i - x_ref_i) + soft term.
 #[inline(always)]
 pub fn costates<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, solution: &mut Solution<NX, NU>) {
     let N = problem.stages.len();
@@ -85,7 +86,8 @@ pub fn span<const NX: usize, const NU: usize>(problem: &Problem<NX, NU>, j: usiz
 }
 
 /// Largest violation of the conditions of optimality, each made dimensionless: stationarity by the scale of [`gradient`],
-/// bounds by the range of the input, complementarity as the smaller one of a scaled multiplier and its scaled distance to the bound.
+/// bounds by the range of the input, complementarity as the smaller one of a scaled multiplier and its scaled distance to the
+/// bound.
 ///
 /// Costates must be those of the plan ([`costates`]) and the states must follow from the inputs.
 #[must_use]

@@ -35,7 +35,7 @@ impl Outcome {
     }
 }
 
-/// Plan over the horizon with what is known about its quality. Without a plan the numbers are those of the last solve.
+/// Plan over the horizon with what is known about its quality. Without a plan the numbers mean nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Solution<const NX: usize, const NU: usize> {
     /// States from now to the end of the horizon.

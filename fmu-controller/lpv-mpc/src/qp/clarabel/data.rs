@@ -21,6 +21,13 @@ pub(super) struct Columns {
     pub values: Vec<f64>,
 }
 
+/// Smallest and largest unit of a state, against SI units [1]: ours, so that a weight of nearly nothing does not make one of a
+/// kilometre.
+const UNITS: [f64; 2] = [0.1, 10.0];
+
+/// Factor on the cost [1]: ours, the order of one over the weights of the default controller.
+const COST: f64 = 1e-2;
+
 /// Units in which Clarabel sees the problem.
 pub(super) struct Scaling<const NX: usize, const NU: usize> {
     pub x: SVector<f64, NX>,
@@ -29,14 +36,13 @@ pub(super) struct Scaling<const NX: usize, const NU: usize> {
 }
 
 impl<const NX: usize, const NU: usize> Scaling<NX, NU> {
-    /// Inputs in units of their range, states so that their weight becomes about one, the cost by the mean input weight.
+    /// Inputs in units of their range, states so that their weight becomes about one, as far as units within [`UNITS`] do that.
     pub fn of(problem: &Problem<NX, NU>) -> Self {
         let x = SVector::from_fn(|k, _| {
             let weight = problem.q[k].max(problem.q_terminal[(k, k)]);
-            // Beyond a factor of 1e3 from SI units the weight is noise to be left small, not a unit to be adopted.
-            if weight > 0.0 { (1.0 / weight.sqrt()).clamp(1e-1, 1e1) } else { 1.0 }
+            if weight > 0.0 { (1.0 / weight.sqrt()).clamp(UNITS[0], UNITS[1]) } else { 1.0 }
         });
-        Self { x, u: SVector::from_fn(|j, _| optimality::span(problem, j)), cost: 1e-2 }
+        Self { x, u: SVector::from_fn(|j, _| optimality::span(problem, j)), cost: COST }
     }
 }
 

@@ -15,8 +15,8 @@ use std::fmt;
 
 /// The quadratic programme through Clarabel's interior point method.
 ///
-/// Variables by stage: u_i, x_(i+1) - x_ref, e_(i+1). Rows: the dynamics of all stages, then by stage the upper and lower bounds of
-/// u, of du, and of the soft state. A bound that is infinite and a soft bound that is off keep their row as 0 <= 1.
+/// Variables by stage: u_i, x_(i+1) - x_ref, e_(i+1). Rows: the dynamics of all stages, then by stage the upper and lower
+/// bounds of u, of du, and of the soft state. A bound that is infinite and a soft bound that is off keep their row as 0 <= 1.
 pub struct Clarabel<const NX: usize, const NU: usize> {
     tolerance: f64,
     workspace: Option<Workspace>,

@@ -1,7 +1,8 @@
 //! Optimal input of a stage: its form, and its gains from the curvature of the inputs that are free.
 
 use super::active::Hold;
-use super::riccati::{Factor, axpy};
+use super::riccati::Factor;
+use crate::lanes::axpy;
 
 /// Optimal input of a stage, `u = K x + L p + k`, stored by columns.
 #[derive(Clone, Copy, Debug)]

@@ -7,6 +7,7 @@
 use super::super::Stage;
 use super::active::Hold;
 use super::policy::{Policy, invert, policy_gains};
+use crate::lanes::axpy;
 
 /// Value function in front of a stage.
 #[derive(Clone, Copy, Debug)]
@@ -85,14 +86,6 @@ impl<const NX: usize, const NU: usize> Factor<NX, NU> {
         Td: [0.0; NU],
         pull: [0.0; NU],
     };
-}
-
-/// `y += a x`, the shape that the compiler turns into packed instructions.
-#[inline(always)]
-pub(super) fn axpy<const M: usize>(a: f64, x: &[f64; M], y: &mut [f64; M]) {
-    for m in 0..M {
-        y[m] += a * x[m];
-    }
 }
 
 #[inline(always)]

@@ -2,8 +2,8 @@
 
 use super::super::optimality;
 use super::active::Active;
-use super::riccati::axpy;
 use super::{Problem, Solution, Stage, Structured};
+use crate::lanes::axpy;
 use nalgebra::SVector;
 
 /// Excess over a bound, as a fraction of the input's range, that is rounding and no violation.

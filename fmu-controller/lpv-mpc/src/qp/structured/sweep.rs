@@ -72,6 +72,10 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
             for j in 0..NU {
                 let at = self.active[i][j];
                 let mut mu = mu_next[j] - gradient[j];
+                if mu.is_nan() {
+                    // Bounds would hide it: their multipliers are only asked for their sign.
+                    solution.residual = f64::NAN;
+                }
                 solution.mu_u[i][j] = 0.0;
                 solution.mu_du[i][j] = 0.0;
                 mu_next[j] = 0.0;

@@ -2,9 +2,10 @@
 
 use super::super::active::Hold;
 use super::super::policy::Policy;
-use super::super::riccati::{self, Affine, Value, axpy, transpose};
+use super::super::riccati::{self, Affine, Value, transpose};
 use super::super::{rollout, sweep};
 use super::rows::{Bounds, Quantity, Row};
+use crate::lanes::axpy;
 
 /// A stage as the passes read it.
 #[derive(Clone, Copy, Debug)]

@@ -10,7 +10,7 @@ mod step;
 use super::super::optimality;
 use super::policy::Policy;
 use super::riccati::Factor;
-use super::{Outcome, Problem, Solution, Structured};
+use super::{Outcome, Problem, Solution, Structured, rollout};
 use crate::lanes::{Work, widest};
 use nalgebra::SVector;
 
@@ -37,13 +37,18 @@ const RESIDUAL_MAX: f64 = 1e-6;
 /// Distance to a bound, its multiplier, and the target of their product.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
+    /// Distance, in the unit of what is bounded.
     s: f64,
     /// Inverse of the distance, as of the last factorisation.
     inverse: f64,
+    /// Multiplier, cost per distance.
     z: f64,
+    /// Wanted product of both.
     target: f64,
+    /// Newton's directions of both.
     ds: f64,
     dz: f64,
+    /// Whether the predictor drives the distance to zero.
     active: bool,
 }
 
@@ -136,16 +141,7 @@ impl<const NX: usize, const NU: usize> Structured<NX, NU> {
                 self.active[i][j].level = side(&rows[0], &rows[1]);
                 self.active[i][j].rate = side(&rows[2], &rows[3]);
             }
-            let x = self.interior.x[i][problem.soft_state];
-            if problem.has_soft_bound() {
-                self.sides[i] = if x > problem.soft_bound {
-                    1
-                } else if x < -problem.soft_bound {
-                    -1
-                } else {
-                    0
-                };
-            }
+            self.sides[i] = rollout::side(problem, self.interior.x[i][problem.soft_state]);
         }
     }
 }

@@ -195,7 +195,10 @@ impl<const NX: usize, const NU: usize> Interior<NX, NU> {
                     let soften = 1.0 / (2.0 * problem.soft);
                     row.dz = (row.target - row.s * row.z + row.z * dx) / (row.s + row.z * soften);
                     row.ds = row.dz * soften - dx;
-                    limit(row);
+                    // None is left where the squares of an excess overflow.
+                    if row.z > 0.0 {
+                        limit(row);
+                    }
                 }
             }
         }
