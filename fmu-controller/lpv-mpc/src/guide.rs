@@ -22,6 +22,8 @@ pub struct Path<T: Scalar> {
     pub mu: T,
     /// Speed that is wanted at the end of the stage, whether it can be had or not [m/s].
     pub wanted: T,
+    /// The same, no faster than the road and the way back to it permit [m/s].
+    pub permitted: T,
     /// Speed to be followed at the end of the stage [m/s].
     pub v_x: T,
     /// Acceleration that the model cannot explain, in the middle of the stage.
@@ -159,7 +161,7 @@ impl<'a, T: Scalar> Guide<'a, T> {
             permitted
         };
         let disturbance = self.course.advance();
-        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, wanted, v_x, disturbance };
+        let path = Path { kappa: [self.kappa, kappa], mu: (self.mu + mu) * 0.5, wanted, permitted, v_x, disturbance };
         (self.kappa, self.mu) = (kappa, mu);
         path
     }

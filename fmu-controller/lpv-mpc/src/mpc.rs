@@ -15,7 +15,7 @@ use crate::hold::Hold;
 use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state, vehicle_part};
 use crate::lanes::{Work, widest};
 use crate::latency::Predicted;
-use crate::model::{Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
+use crate::model::{A_X, Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::modes::Backend;
 use crate::plan::Plan;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
@@ -29,6 +29,14 @@ const FIRST_PASSES: usize = 3;
 /// Speed below which a car that is to stand holds its steering [m/s]: seven standard deviations of the speed's sensor. With
 /// sensor noise and without this, `cargo fmu robustness --case stop_steering_noise` sees the wheels turn by 4 deg.
 const STANDSTILL: f64 = 0.2;
+
+/// Excess over every speed that is permitted along the plan from which on the drive is shut [m/s]: sixteen standard deviations of
+/// the speed's sensor.
+///
+/// In a bend a faster car turns faster against the path. A plan whose steering is at its bounds would step on the gas to come
+/// back to the path: with a steering rate of 0.05 rad/s and without [`crate::ahead`]'s limit a car that is to drive the lane change
+/// at 5 m/s gets to 12.
+const TOO_FAST: f64 = 0.5;
 
 /// A car that is to stand does not want to drive away sooner [s]: at the default rate 0.1 rad are steered meanwhile.
 const SOON: f64 = 0.13;
@@ -76,8 +84,13 @@ pub struct Mpc<const N_X: usize> {
     steering_step: f64,
     /// Weight of the steering increments when there is no need for caution [1/rad2].
     r_delta: f64,
+    /// Largest acceleration and its largest change per period [m/s2].
+    drive: f64,
+    drive_step: f64,
     /// Fastest speed that was soon wanted when the last plan was made [m/s].
     fastest: f64,
+    /// Fastest speed that was permitted along it [m/s].
+    permitted: f64,
     /// Increments of the steering that the path asks for [rad].
     increments: Vec<f64>, // N
     /// The stage before the plan's first one, for this sample and for the next.
@@ -107,7 +120,10 @@ impl<const N_X: usize> Mpc<N_X> {
             terminal: Terminal::new(p),
             steering_step: p.delta_rate_max * p.t_s,
             r_delta: p.r_delta,
+            drive: p.a_x_max,
+            drive_step: p.a_x_rate_max * p.t_s,
             fastest: f64::INFINITY,
+            permitted: f64::INFINITY,
             increments: vec![0.0; p.horizon],
             past: None,
             next: None,
@@ -135,6 +151,7 @@ impl<const N_X: usize> Mpc<N_X> {
         self.r_delta = p.r_delta;
         problem.u_min = Input::from([-p.delta_max, p.a_x_min]);
         problem.u_max = Input::from([p.delta_max, p.a_x_max]);
+        (self.drive, self.drive_step) = (p.a_x_max, p.a_x_rate_max * p.t_s);
         problem.du_max = Input::from([p.delta_rate_max, p.a_x_rate_max]) * p.t_s;
         self.steering_step = problem.du_max[DELTA];
         problem.soft_state = E_Y;
@@ -166,6 +183,7 @@ impl<const N_X: usize> Mpc<N_X> {
         }
         let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
         self.problem.du_max[DELTA] = if stands { 0.0 } else { self.steering_step };
+        self.limit_drive(u_prev[A_X]);
         self.problem.soft_bound = self.soft_bound + recovery.map_or(0.0, |recovery| recovery.room);
         // Planned speeds: weights do not depend on the measurement, which keeps the derivative exact.
         self.problem.r[DELTA] = self.r_delta * caution(self.plan.x[1][V_X], guide.latency());
@@ -191,6 +209,17 @@ impl<const N_X: usize> Mpc<N_X> {
             && self.backend == Backend::Structured
             && self.solution.outcome == Outcome::Optimal;
         self.solution.outcome
+    }
+
+    /// Shuts the drive of a car that is too fast, from the acceleration that was commanded last [m/s2].
+    fn limit_drive(&mut self, a_x: f64) {
+        let (mut bound, mut step) = (self.drive, self.drive_step);
+        if self.problem.x_0[V_X] > self.permitted + TOO_FAST {
+            // The solver counts increments from within the bounds: what the bound takes of the rate is not the plan's as well.
+            bound = (a_x - 0.5 * step).clamp(0.0, self.drive);
+            step -= (a_x - bound).clamp(0.0, 0.5 * step);
+        }
+        (self.problem.u_max[A_X], self.problem.du_max[A_X]) = (bound, step);
     }
 
     /// Drops the plan: the next sample begins anew, from steady driving on the reference.
@@ -232,7 +261,7 @@ impl<const N_X: usize> Mpc<N_X> {
     ) {
         let around = Surroundings { nominal: tyres.nominal(), hold };
         tyres.restart();
-        self.fastest = 0.0;
+        (self.fastest, self.permitted) = (0.0, 0.0);
         self.schedule.take(&self.plan);
         let from = vehicle_part(&self.problem.x_0);
         // In the middle of the stage before, as the plan goes on from there.
@@ -246,6 +275,7 @@ impl<const N_X: usize> Mpc<N_X> {
             if i as f64 * hold.step < SOON {
                 self.fastest = self.fastest.max(path.wanted);
             }
+            self.permitted = self.permitted.max(path.permitted);
             linearise(&at, &path, &self.tyres[i], &around, stage.into());
             self.increments[i] = ideal.advance(at.x[V_X], &path, &self.tyres[i]);
             if let Some(recovery) = recovery {

@@ -65,7 +65,8 @@ impl Terminal {
         if self.cost == TerminalCost::StageWeights || (is_same(v_x, self.v_x) && is_same(r_delta, self.r_delta)) {
             return;
         }
-        let straight = Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, v_x, disturbance: Disturbance::zeros() };
+        let straight =
+            Path { kappa: [0.0; 2], mu: 1.0, wanted: v_x, permitted: v_x, v_x, disturbance: Disturbance::zeros() };
         let around = Surroundings { nominal: *tyres, hold };
         let mut x = State::zeros();
         x[V_X] = v_x;

@@ -26,7 +26,7 @@ fn ends(kappa: impl Fn(f64) -> f64, i: usize) -> [f64; 2] {
 }
 
 fn path(kappa: [f64; 2]) -> Path<f64> {
-    Path { kappa, mu: 0.82, wanted: V, v_x: V, disturbance: Disturbance::zeros() }
+    Path { kappa, mu: 0.82, wanted: V, permitted: V, v_x: V, disturbance: Disturbance::zeros() }
 }
 
 fn straight_ahead(past: Option<Past>, body: &Body) -> FeedForward<'_, f64> {

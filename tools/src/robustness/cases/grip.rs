@@ -7,6 +7,9 @@ use crate::robustness::scenario::Scenario;
 
 /// Steering rate of a road car's actuator [rad/s]; 0.4 to 0.8 are usual.
 const STEERING_RATE: f64 = 0.5;
+/// Steering rate that follows the lane change at 4 m/s at best [rad/s], and speeds that are wanted all the same [m/s].
+const SLOW_RATE: f64 = 0.07;
+const SLOW: [f64; 3] = [5.0, 8.0, 14.0];
 /// Where the patch begins [m]: between the two lane changes, while the car is still turning.
 const PATCH: f64 = 90.0;
 /// Friction on the patch over that of the road: 0.4 over 0.82.
@@ -20,10 +23,7 @@ const BRAKING: f64 = 2.0;
 const PATCHED: [f64; 3] = [12.0, 14.0, 16.0];
 
 pub(super) fn cases() -> Vec<Case> {
-    let at = |speed: f64| {
-        Scenario::lane_change(speed)
-            .with(&[("plant.delta_rate_max", STEERING_RATE), ("controller.delta_rate_max", STEERING_RATE)])
-    };
+    let at = |speed: f64| steered(speed, STEERING_RATE);
     let range = (0..=24).flat_map(|i| {
         let speed = 14.0 + 0.25 * f64::from(i);
         let quick = Scenario::lane_change(speed).called(format!("{speed} m/s, 0.8 rad/s"));
@@ -35,6 +35,12 @@ pub(super) fn cases() -> Vec<Case> {
         case("grip_20", "lane change at 20 m/s", Some(1.5), vec![at(20.0)]),
         // What is borne at 20 m/s is borne below it: a controller that slows down late fails in between.
         case("grip_range", "lane change at any speed from 14 to 20 m/s", Some(1.5), range.collect()),
+        case(
+            "slow_steering",
+            "lane change at 5, 8 and 14 m/s, steering rate 0.07 rad/s",
+            Some(0.5),
+            SLOW.map(|speed| steered(speed, SLOW_RATE).called(format!("{speed} m/s"))).into(),
+        ),
         case(
             "patch",
             "friction falls to 0.4 in mid-manoeuvre, seen in the preview",
@@ -54,6 +60,11 @@ pub(super) fn cases() -> Vec<Case> {
             PATCHED.map(|speed| on_ice(speed).unaware_of_friction()).into(),
         ),
     ]
+}
+
+/// The lane change with a steering rate [rad/s] that both sides know.
+fn steered(speed: f64, rate: f64) -> Scenario {
+    Scenario::lane_change(speed).with(&[("plant.delta_rate_max", rate), ("controller.delta_rate_max", rate)])
 }
 
 /// The lane change with a patch from [`PATCH`] on.
