@@ -213,6 +213,12 @@ fn inputs_that_change_stop_at_the_ends_of_their_ranges() {
 }
 
 #[test]
+fn any_negative_speed_at_the_start_means_that_of_the_road() {
+    let of = |v_x_0| driver::vehicle("general", Parameters { v_x_0, ..Parameters::default() }).measurement().v_x;
+    assert_eq!([of(-70.0), of(-5.0), of(-0.1)], [of(-1.0); 3]);
+}
+
+#[test]
 fn projection_is_right_far_inside_a_hairpin() {
     // A hairpin of 12 m radius; the car leaves the road straight through the centre of the curve and beyond.
     let radius = 12.0;
