@@ -67,6 +67,36 @@ def test_small_angles_agree_with_the_single_track_model_of_commonroad(plant, spe
         assert error < 1e-6, f"{name}: relative error {error:.1e}"
 
 
+def test_input_set_again_after_a_ramp_acts_at_once(plant):
+    with Unit(plant, "again") as unit:
+        unit.initialize(road="straight")
+        unit.set(delta=0.01)
+        rates_of(unit, delta=0.5)
+        unit.step(0.0, 0.1)
+        assert unit.get("delta_actual") == pytest.approx(0.06, abs=1e-12)
+        unit.set(delta=0.01)
+        assert unit.get("delta_actual") == 0.01
+
+
+def test_inputs_that_change_stay_in_their_ranges(plant):
+    with Unit(plant, "ranges") as unit:
+        unit.initialize(road="straight")
+        unit.set(wind_speed=100.0, mu_scale=0.1)
+        rates_of(unit, wind_speed=1e4, mu_scale=-1e100, delta=1e100, a_x=-1e300, wind_direction=1e308)
+        unit.step(0.0, 1.0)
+        assert unit.get("wind_speed_actual") == pytest.approx(100.0, rel=1e-12)
+        unit.step(1.0, 0.1)
+
+
+def test_preview_shows_the_friction_that_was_set_from_the_start(plant):
+    with Unit(plant, "friction") as unit:
+        unit.set(mu_scale=0.5)
+        unit.initialize(road="straight")
+        before = unit.get("mu_ref[1]")
+        unit.step(0.0, 0.01)
+        assert before == unit.get("mu_ref[1]") == 0.5 * 0.82
+
+
 def bicycle(p, kappa, delta, a_x, wind):
     """The corrected equations of the paper's plant, written down once more."""
     front, rear = (p.mu * p.m * p.g * arm / (p.l_f + p.l_r) for arm in (p.l_r, p.l_f))

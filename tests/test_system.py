@@ -21,7 +21,8 @@ def test_system_is_valid_by_the_schemas(system):
     assert [c.name for c in ssd.system.elements] == ["plant", "controller"]
     with zipfile.ZipFile(system) as archive:
         sets = [name for name in archive.namelist() if name.endswith(".ssv")]
-    assert {"resources/double_lane_change.ssv", "resources/general.ssv", "resources/paper_weights.ssv"} <= set(sets)
+    roads = ["circuit", "constant_radius", "double_lane_change", "general", "iso_3888_1", "iso_3888_2", "sine_with_dwell", "step_steer", "straight"]
+    assert sorted(sets) == sorted(f"resources/{name}.ssv" for name in [*roads, "paper_weights", "shipped_weights"])
     for name in sets:
         assert read_ssv(system, resource=name, validate=True).parameters
 

@@ -19,8 +19,8 @@ pub struct VehiclePlant {
     /// Name of a manoeuvre, or a file of comma-separated values.
     road: String,
     inputs: Inputs,
-    /// The inputs as they were set when the last step began.
-    stepped: Inputs,
+    /// The inputs that act now: the ones set, or after a step with input derivatives what those led to, until set again.
+    acting: Inputs,
     /// The vehicle, once initialisation has built it.
     vehicle: Option<Vehicle>,
     measurement: Measurement,
@@ -36,7 +36,7 @@ impl Default for VehiclePlant {
             road: "double_lane_change".to_owned(),
             parameters,
             inputs: Inputs::default(),
-            stepped: Inputs::default(),
+            acting: Inputs::default(),
             vehicle: None,
             measurement: Measurement::default(),
             outputs: Outputs::default(),
@@ -48,20 +48,6 @@ impl Default for VehiclePlant {
 impl VehiclePlant {
     fn vehicle(&self) -> &Vehicle {
         self.vehicle.as_ref().expect("the life cycle lets nothing be computed before initialisation has built it")
-    }
-
-    /// The inputs that act now: after a step with input derivatives the extrapolated ones, until new ones are set.
-    fn acting(&self) -> Inputs {
-        let end = &self.vehicle().truth().inputs;
-        let (now, stepped) = (&self.inputs, &self.stepped);
-        let pick = |now: f64, stepped: f64, end: f64| if now.to_bits() == stepped.to_bits() { end } else { now };
-        Inputs {
-            delta: pick(now.delta, stepped.delta, end.delta),
-            a_x: pick(now.a_x, stepped.a_x, end.a_x),
-            wind_speed: pick(now.wind_speed, stepped.wind_speed, end.wind_speed),
-            wind_direction: pick(now.wind_direction, stepped.wind_direction, end.wind_direction),
-            mu_scale: pick(now.mu_scale, stepped.mu_scale, end.mu_scale),
-        }
     }
 
     /// A plant whose calculated values are these derivatives.
@@ -104,9 +90,8 @@ impl Model for VehiclePlant {
     fn initialize(&mut self, experiment: &Experiment<'_>, _log: &mut dyn Log) -> Result<(), Error> {
         self.parameters.tyre = Preset::named(&self.tyre)?;
         let road = road::load(&self.road, &self.parameters, experiment.resources)?;
-        let vehicle = Vehicle::new(self.parameters.clone(), road)?;
+        let vehicle = Vehicle::new(self.parameters.clone(), road)?.under(self.inputs)?;
         self.measurement = vehicle.measurement();
-        self.stepped = vehicle.truth().inputs;
         self.vehicle = Some(vehicle);
         Ok(())
     }
@@ -115,19 +100,19 @@ impl Model for VehiclePlant {
         let rates = variables::along(step.input_derivatives.iter().map(|d: &InputDerivative| (d.reference, d.value)));
         let vehicle = self.vehicle.as_mut().expect("a step comes after initialisation");
         vehicle.advance_along(step.h, &self.inputs, &rates)?;
-        self.stepped = self.inputs;
+        self.acting = vehicle.truth().inputs;
         self.measurement = vehicle.measurement();
         Ok(Outcome::Ok)
     }
 
     fn refresh(&mut self) {
         let vehicle = self.vehicle();
-        (self.outputs, self.preview) = (vehicle.outputs_under(&self.acting()), vehicle.preview());
+        (self.outputs, self.preview) = (vehicle.outputs_under(&self.acting), vehicle.preview());
     }
 
     fn output_derivative(&self, reference: u32, _order: u32) -> Option<f64> {
         let vehicle = self.vehicle();
-        let tangent = Self::tangent(vehicle.outputs_rate(&self.acting()), vehicle.preview_rate());
+        let tangent = Self::tangent(vehicle.outputs_rate(&self.acting), vehicle.preview_rate());
         variables::real(&tangent, reference)
     }
 
@@ -142,7 +127,7 @@ impl Model for VehiclePlant {
             return Err(Error::NoDerivative(variables::name(reference)));
         }
         let along = variables::along(knowns.iter().copied().zip(seed.iter().copied()));
-        let tangent = Self::tangent(self.vehicle().outputs_along(&self.acting(), &along), Preview::default());
+        let tangent = Self::tangent(self.vehicle().outputs_along(&self.acting, &along), Preview::default());
         for (slot, &unknown) in sensitivity.iter_mut().zip(unknowns) {
             *slot = variables::real(&tangent, unknown).unwrap_or(0.0);
         }

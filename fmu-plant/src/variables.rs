@@ -53,11 +53,11 @@ pub fn real(plant: &VehiclePlant, reference: u32) -> Option<f64> {
 /// Value references are rows: append, never reorder.
 pub fn table() -> &'static Table<VehiclePlant> {
     variables! { VehiclePlant;
-        Input delta ["rad"] "Front steering angle command, positive to the left; beyond the actuator's limit it saturates", terminal "command", min I_MIN.delta, max I_MAX.delta => inputs.delta;
-        Input a_x ["m/s2"] "Longitudinal acceleration command of drive and brakes; negative brakes and never reverses", terminal "command", min I_MIN.a_x, max I_MAX.a_x => inputs.a_x;
-        Input wind_speed ["m/s"] "Wind, added to the manoeuvre's own", min I_MIN.wind_speed, max I_MAX.wind_speed => inputs.wind_speed;
-        Input wind_direction ["rad"] "Direction that the wind blows to, in the road frame at the start; 0 is along the road", min I_MIN.wind_direction, max I_MAX.wind_direction => inputs.wind_direction;
-        Input mu_scale ["1"] "Factor on the friction", min I_MIN.mu_scale, max I_MAX.mu_scale => inputs.mu_scale;
+        Input delta ["rad"] "Front steering angle command, positive to the left; beyond the actuator's limit it saturates", terminal "command", min I_MIN.delta, max I_MAX.delta => { get |m| m.inputs.delta, set |m, v: f64| (m.inputs.delta, m.acting.delta) = (v, v) };
+        Input a_x ["m/s2"] "Longitudinal acceleration command of drive and brakes; negative brakes and never reverses", terminal "command", min I_MIN.a_x, max I_MAX.a_x => { get |m| m.inputs.a_x, set |m, v: f64| (m.inputs.a_x, m.acting.a_x) = (v, v) };
+        Input wind_speed ["m/s"] "Wind, added to the manoeuvre's own", min I_MIN.wind_speed, max I_MAX.wind_speed => { get |m| m.inputs.wind_speed, set |m, v: f64| (m.inputs.wind_speed, m.acting.wind_speed) = (v, v) };
+        Input wind_direction ["rad"] "Direction that the wind blows to, in the road frame at the start; 0 is along the road", min I_MIN.wind_direction, max I_MAX.wind_direction => { get |m| m.inputs.wind_direction, set |m, v: f64| (m.inputs.wind_direction, m.acting.wind_direction) = (v, v) };
+        Input mu_scale ["1"] "Factor on the friction", min I_MIN.mu_scale, max I_MAX.mu_scale => { get |m| m.inputs.mu_scale, set |m, v: f64| (m.inputs.mu_scale, m.acting.mu_scale) = (v, v) };
 
         Output v_x ["m/s"] "Measured longitudinal velocity, body frame", terminal "measurement", depends &[], lazy false => measurement.v_x;
         Output v_y ["m/s"] "Measured lateral velocity of the centre of gravity, positive to the left", terminal "measurement", depends &[], lazy false => measurement.v_y;
@@ -155,7 +155,7 @@ pub fn table() -> &'static Table<VehiclePlant> {
         Output lap "Completed laps of a closed track", depends &[] => outputs.lap;
         Output slip_f ["1"] "Front slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &["delta"] => outputs.slip_f;
         Output slip_r ["1"] "Rear slip angle over that of the peak force; 0 if the tyre has no peak", min 0.0, depends &[] => outputs.slip_r;
-        Output mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times", terminal "preview", depends &[] => preview.mu_ref;
+        Output mu_ref [PREVIEW] ["1"] "Friction of the road now (element 1) and where the reference will be at the next 40 sample times", terminal "preview", depends &[], depends_initially &["mu_scale"] => preview.mu_ref;
     }
 }
 

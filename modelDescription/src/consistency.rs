@@ -67,7 +67,7 @@ impl Knowns {
             }
         }
         for row in table.rows {
-            for name in row.depends.unwrap_or_default() {
+            for name in row.depends.unwrap_or_default().iter().chain(row.depends_initially) {
                 if !inputs.contains_key(name) {
                     return Err(contradiction(row, format!("depends on {name}, which is not an input")));
                 }
@@ -83,6 +83,8 @@ impl Knowns {
 
     /// At the start every output may depend on every parameter as well.
     pub fn at_start<M>(&self, row: &Row<M>) -> Option<BTreeSet<u32>> {
-        self.of_output(row).map(|inputs| &inputs | &self.parameters)
+        let initially = row.depends_initially.iter().flat_map(|name| &self.inputs[name]);
+        let more: BTreeSet<u32> = initially.chain(&self.parameters).copied().collect();
+        self.of_output(row).map(|inputs| &inputs | &more)
     }
 }

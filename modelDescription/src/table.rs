@@ -87,6 +87,8 @@ pub struct Row<M> {
     pub items: Option<&'static Enumeration>,
     /// Names of the inputs that the value depends on directly; None: all of them.
     pub depends: Option<&'static [&'static str]>,
+    /// Names of the inputs that the value depends on before the first step, beside those.
+    pub depends_initially: &'static [&'static str],
     /// Whether people may want to see the unit's usual display unit.
     pub display: bool,
     /// Whether a Real changes only at certain instants.
@@ -145,6 +147,7 @@ impl<M> Row<M> {
             nominal: None,
             items: None,
             depends: None,
+            depends_initially: &[],
             display: true,
             discrete: false,
             lazy: role.is_calculated(),
@@ -183,6 +186,12 @@ impl<M> Row<M> {
     /// Names the inputs that the value depends on directly.
     pub const fn depends(mut self, depends: &'static [&'static str]) -> Self {
         self.depends = Some(depends);
+        self
+    }
+
+    /// Names further inputs that the value depends on before the first step.
+    pub const fn depends_initially(mut self, depends: &'static [&'static str]) -> Self {
+        self.depends_initially = depends;
         self
     }
 

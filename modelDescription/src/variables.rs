@@ -18,7 +18,8 @@
 /// - Start values of inputs and parameters are those of the model's `Default`; they are not typed again.
 /// - Attributes: `min 0.0`, `max 1.0` (enforced when set), `nominal 1e4`, `items &ENUMERATION`, `display false` (no display unit),
 ///   `discrete true` (a Real output that is held between samples), `depends &["v_x"]` (the inputs that an output depends on
-///   directly, by name without index; `&[]`: none; left out: all), `lazy false` (a calculated row that `step` itself keeps up to
+///   directly, by name without index; `&[]`: none; left out: all), `depends_initially &["mu"]` (before the first step these too),
+///   `lazy false` (a calculated row that `step` itself keeps up to
 ///   date, so that reading it need not call `Model::refresh`), `terminal "preview"` (drawn and connected with its like as one).
 /// - `{ get ..., set ... }` converts; `set` is left out of outputs, and both take an index after `m` in arrays.
 #[macro_export]

@@ -11,9 +11,13 @@ use serde::{Deserialize, Serialize};
 /// Times closer than this are the same time: rounding of summed steps, far below any effect on the motion [s].
 const SAME_TIME: f64 = 1e-10;
 
-/// Changes of the command that a delay remembers: 1 s of them at a communication step of 0.25 ms. Of denser
-/// changes the oldest but one is forgotten, and the one before it holds on.
-const CAPACITY: usize = 4096;
+/// Parts of a delay that keep a change of the command each when there are more changes than room: a delay of 1 s then
+/// follows its command at most 0.5 ms late.
+const RESOLUTION: u16 = 2048;
+
+/// Changes of the command that a delay remembers exactly: 1 s of them at a communication step of 0.25 ms. Thinning leaves
+/// at most two in each part, the one that acts, and one at either end.
+const CAPACITY: usize = 2 * RESOLUTION as usize + 4;
 
 /// Constants of one actuator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,7 +125,7 @@ impl State {
     /// Makes room for all commands to come, so that no step allocates.
     pub(crate) fn make_room(&mut self, actuator: &Actuator) {
         if actuator.delay > 0.0 {
-            self.history.reserve(CAPACITY.saturating_sub(self.history.len()));
+            self.history.reserve_exact(CAPACITY.saturating_sub(self.history.len()));
         }
     }
 
@@ -141,9 +145,26 @@ impl State {
             return;
         }
         if self.history.len() >= CAPACITY {
-            self.history.remove(1);
+            self.thin(actuator.delay / f64::from(RESOLUTION));
         }
         self.history.push_back((time, command));
+    }
+
+    /// Forgets each command that was replaced within `resolution` after the one kept before it, which holds on instead.
+    ///
+    /// Dropping by age or by turns was rejected: a stream of new commands would drop the same old ones again and again
+    /// until nothing is left that acts before the whole stream has come through. The oldest and the newest stay.
+    fn thin(&mut self, resolution: f64) {
+        let mut kept = 0;
+        for next in 2..self.history.len() {
+            if self.history[next].0 - self.history[kept].0 > resolution {
+                kept += 1;
+                self.history[kept] = self.history[next - 1];
+            }
+        }
+        let newest = self.history.len() - 1;
+        self.history.swap(kept + 1, newest);
+        self.history.truncate(kept + 2);
     }
 
     /// The command at the end of the delay at `time`, and how long it stays linear [s].
@@ -152,14 +173,12 @@ impl State {
             return (now, f64::INFINITY);
         }
         let sent = time - actuator.delay;
-        let mut current = Ramp::default();
-        for &(start, ramp) in &self.history {
-            if start > sent + SAME_TIME {
-                return (current, start - sent);
-            }
-            current = Ramp { value: ramp.value + ramp.slope * (sent - start), slope: ramp.slope };
-        }
-        (current, f64::INFINITY)
+        let next = self.history.partition_point(|&(start, _)| start <= sent + SAME_TIME);
+        let current = next.checked_sub(1).map_or_else(Ramp::default, |acting| {
+            let (start, Ramp { value, slope }) = self.history[acting];
+            Ramp { value: value + slope * (sent - start), slope }
+        });
+        (current, self.history.get(next).map_or(f64::INFINITY, |&(start, _)| start - sent))
     }
 
     /// The next piece from `time` on, at most `limit` seconds long, and its length [s].

@@ -67,7 +67,7 @@ pub struct Parameters {
     pub arm_side: f64,
     /// Rolling resistance coefficient [1].
     pub c_rr: f64,
-    /// Delay of the steering command [s].
+    /// Delay of the steering command; dense changes of it come through to within its 2048th part [s].
     pub delay_delta: f64,
     /// Time constant of the steering's first-order lag [s].
     pub tau_delta: f64,
@@ -75,7 +75,7 @@ pub struct Parameters {
     pub delta_rate_max: f64,
     /// Largest steering angle [rad].
     pub delta_max: f64,
-    /// Delay of the acceleration command [s].
+    /// Delay of the acceleration command, likewise [s].
     pub delay_a_x: f64,
     /// Time constant of the drive's and brake's first-order lag [s].
     pub tau_a_x: f64,
@@ -289,7 +289,7 @@ impl Parameters {
         preview_step 0.001, 1.0;
         e_y_0 -20.0, 20.0;
         e_psi_0 -3.2, 3.2;
-        v_x_0 -1.0, 70.0;
+        v_x_0 -70.0, 70.0;
     }
 }
 

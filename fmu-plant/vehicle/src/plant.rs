@@ -140,6 +140,13 @@ impl Vehicle {
         Ok(vehicle)
     }
 
+    /// This vehicle with `inputs` that act before the first step: the preview shows their friction.
+    pub fn under(mut self, inputs: Inputs) -> Result<Self, Error> {
+        inputs.validate()?;
+        self.state.inputs = inputs;
+        Ok(self)
+    }
+
     /// The parameters.
     #[must_use]
     pub fn parameters(&self) -> &Parameters {
@@ -163,7 +170,7 @@ impl Vehicle {
         self.advance_along(h, inputs, &Inputs::ZERO)
     }
 
-    /// Moves on by `h` seconds while the inputs change at `rates`.
+    /// Moves on by `h` seconds while the inputs change at `rates`, each until it reaches the end of its range.
     ///
     /// After an error the motion is where it was before the step.
     pub fn advance_along(&mut self, h: f64, inputs: &Inputs, rates: &Inputs) -> Result<(), Error> {
@@ -171,6 +178,7 @@ impl Vehicle {
             return Err(Error::Step(h));
         }
         inputs.validate()?;
+        let rates = &rates.bounded();
         let before = (self.state.x, self.state.time, self.state.steering.position, self.state.drive.position);
         let start = self.state.time;
         let delta = |t: f64| Ramp { value: inputs.delta + rates.delta * t, slope: rates.delta };

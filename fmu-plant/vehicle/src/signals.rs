@@ -29,6 +29,10 @@ impl Default for Inputs {
     }
 }
 
+/// Shortest time in which an input crosses its range [s]: faster is a jump, and rates such as 1e100 would overflow where
+/// they multiply.
+const CROSSING: f64 = 1e-6;
+
 macro_rules! ranges {
     ($($field:ident $min:expr, $max:expr;)*) => {
         /// The smallest value of each input.
@@ -46,24 +50,28 @@ macro_rules! ranges {
             )*
             Ok(())
         }
+
+        /// These inputs after `t` seconds of changing at `rates`, each held in its range.
+        #[must_use]
+        pub fn after(&self, t: f64, rates: &Self) -> Self {
+            Self { $($field: (self.$field + t * rates.$field).clamp(Self::MIN.$field, Self::MAX.$field)),* }
+        }
+
+        /// These rates, none faster than through its input's whole range in [`CROSSING`].
+        pub(crate) fn bounded(&self) -> Self {
+            Self {
+                $($field: {
+                    let most = (Self::MAX.$field - Self::MIN.$field) / CROSSING;
+                    self.$field.clamp(-most, most)
+                }),*
+            }
+        }
     };
 }
 
 impl Inputs {
     /// No change of any input.
     pub const ZERO: Self = Self { delta: 0.0, a_x: 0.0, wind_speed: 0.0, wind_direction: 0.0, mu_scale: 0.0 };
-
-    /// These inputs after `t` seconds of changing at `rates`; friction stays inside its range.
-    #[must_use]
-    pub fn after(&self, t: f64, rates: &Self) -> Self {
-        Self {
-            delta: self.delta + t * rates.delta,
-            a_x: self.a_x + t * rates.a_x,
-            wind_speed: self.wind_speed + t * rates.wind_speed,
-            wind_direction: self.wind_direction + t * rates.wind_direction,
-            mu_scale: (self.mu_scale + t * rates.mu_scale).clamp(Self::MIN.mu_scale, Self::MAX.mu_scale),
-        }
-    }
 }
 
 // Commands may exceed what the actuators reach: those saturate.

@@ -173,6 +173,52 @@ fn values_outside_their_ranges_are_refused_by_name() {
 }
 
 #[test]
+fn inputs_that_change_stop_at_the_ends_of_their_ranges() {
+    let start = Inputs { mu_scale: 0.7, ..Inputs::default() };
+    let case = |rate: f64, pick: fn(&mut Inputs) -> &mut f64| {
+        let mut rates = Inputs::ZERO;
+        *pick(&mut rates) = rate;
+        let [mut min, mut max] = [Inputs::MIN, Inputs::MAX];
+        let mut want = start;
+        *pick(&mut want) = if rate > 0.0 { *pick(&mut max) } else { *pick(&mut min) };
+        for h in [1e-4, 0.1, 1.0] {
+            for actuator in
+                [Parameters::default(), Parameters { delay_delta: 0.2, tau_a_x: 0.1, ..Parameters::default() }]
+            {
+                let mut vehicle = driver::vehicle("straight", Parameters { v_x_0: 10.0, ..actuator });
+                vehicle
+                    .advance_along(h, &start, &rates)
+                    .unwrap_or_else(|error| panic!("{rates:?} over {h} s: {error}"));
+                let got = vehicle.truth().inputs;
+                assert_eq!(got, want, "{rates:?} over {h} s");
+                assert_finite(&vehicle, &got, &format!("{rates:?} over {h} s"));
+                let o = vehicle.outputs();
+                assert!(o.delta_actual.abs() <= vehicle.parameters().delta_max, "{} rad", o.delta_actual);
+                vehicle.advance(0.1, &start).unwrap();
+            }
+        }
+    };
+    for rate in [1e7, 1e100, f64::MAX] {
+        for pick in [
+            (|i| &mut i.delta) as fn(&mut Inputs) -> &mut f64,
+            |i| &mut i.a_x,
+            |i| &mut i.wind_speed,
+            |i| &mut i.wind_direction,
+            |i| &mut i.mu_scale,
+        ] {
+            case(rate, pick);
+            case(-rate, pick);
+        }
+    }
+}
+
+#[test]
+fn any_negative_speed_at_the_start_means_that_of_the_road() {
+    let of = |v_x_0| driver::vehicle("general", Parameters { v_x_0, ..Parameters::default() }).measurement().v_x;
+    assert_eq!([of(-70.0), of(-5.0), of(-0.1)], [of(-1.0); 3]);
+}
+
+#[test]
 fn projection_is_right_far_inside_a_hairpin() {
     // A hairpin of 12 m radius; the car leaves the road straight through the centre of the curve and beyond.
     let radius = 12.0;

@@ -10,14 +10,15 @@ use crate::parameter_set::{ParameterSet, units};
 use crate::workspace::{CONTROLLER, Model, PLANT, SYSTEM};
 use crate::xml::Element;
 
-/// The manoeuvres that are driven in closed loop, the default one last.
+/// All manoeuvres, the default one last.
 ///
 /// Every set gives values to the same parameters, so that the last binding of a component wins as a whole, [SSP, 4.5.4]:
 /// a tool that applies all of them runs the lane change, and one that selects by name runs what was asked for.
 fn manoeuvres() -> Vec<ParameterSet> {
-    ["general", "iso_3888_1", "iso_3888_2", "constant_radius", "circuit", "double_lane_change"]
-        .map(|name| ParameterSet::new(name, vec![("road", name.to_owned()), ("speed", "14".to_owned())]))
-        .into()
+    let default = "double_lane_change";
+    let others = vehicle::road::NAMES.into_iter().filter(|name| *name != default);
+    let set = |name: &str| ParameterSet::new(name, vec![("road", name.to_owned()), ("speed", "14".to_owned())]);
+    others.chain([default]).map(set).collect()
 }
 
 /// The controller's tuning: the paper's, and the shipped one, which is the default.

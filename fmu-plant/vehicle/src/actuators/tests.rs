@@ -108,3 +108,74 @@ fn delay_shifts_the_command_exactly() {
         .collect();
     assert_eq!(got, want);
 }
+
+/// Largest difference of a delayed sine, commanded anew at every step `h`, to the sine of the time before, and the
+/// largest number of changes that were kept.
+fn delayed_sine(delay: f64, h: f64, ramps: bool) -> (f64, usize) {
+    let actuator = Actuator { delay, ..FREE };
+    let mut state = State::new(&actuator);
+    let mut room = state.history.capacity();
+    let (mut worst, mut entries): (f64, usize) = (0.0, 0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of steps")]
+    for k in 0..(2.2 * delay / h) as u32 {
+        let t = f64::from(k) * h;
+        let slope = if ramps { OMEGA * (OMEGA * t).cos() } else { 0.0 };
+        state.command(&actuator, t, Ramp { value: (OMEGA * t).sin(), slope });
+        entries = entries.max(state.history.len());
+        let (piece, _) = state.piece(&actuator, t, Ramp::default(), h);
+        let want = if t < delay { 0.0 } else { (OMEGA * (t - delay)).sin() };
+        worst = worst.max((piece.at(0.0) - want).abs());
+        if k % 1000 == 0 {
+            // Clones and what was written keep the room and the times.
+            let bytes = postcard::to_allocvec(&state).unwrap();
+            let mut read: State = postcard::from_bytes(&bytes).unwrap();
+            read.make_room(&actuator);
+            assert_eq!(read, state, "delay {delay} s, step {h} s");
+            state = if k % 2000 == 0 { read } else { state.clone() };
+            room = state.history.capacity();
+        }
+        assert_eq!(state.history.capacity(), room, "a step took memory: delay {delay} s, step {h} s");
+    }
+    (worst, entries)
+}
+
+/// Frequency of the sines [rad/s].
+const OMEGA: f64 = 7.0;
+
+#[test]
+fn dense_commands_arrive_after_the_delay() {
+    for delay in [0.05, 0.5, 1.0] {
+        for h in [1e-5, 1e-4, 1e-3] {
+            for ramps in [false, true] {
+                let (worst, entries) = delayed_sine(delay, h, ramps);
+                // A command that is held is up to a step old. Thinned, it is up to a part of the delay late on top of that.
+                let late = h + if delay / h > 4000.0 { delay / f64::from(RESOLUTION) } else { 0.0 };
+                let tolerance = OMEGA * late + 1e-9;
+                assert!(worst < tolerance, "{worst} over {tolerance}: delay {delay} s, step {h} s, ramps {ramps}");
+                assert!(entries <= CAPACITY, "{entries} entries: delay {delay} s, step {h} s");
+            }
+        }
+    }
+}
+
+#[test]
+fn thinning_leaves_room_however_the_commands_are_spread() {
+    // Pairs of commands close to each other, and parts of the delay just below and above what is merged.
+    let delay = 0.5;
+    let part = delay / f64::from(RESOLUTION);
+    for gaps in
+        [[1e-3 * part, part], [0.501 * part, 0.501 * part], [0.499 * part, 0.499 * part], [1e-6 * part, 3.0 * part]]
+    {
+        let actuator = Actuator { delay, ..FREE };
+        let mut state = State::new(&actuator);
+        let mut t = 0.0;
+        for k in 0..20_000_u32 {
+            state.command(&actuator, t, Ramp { value: t, slope: 0.0 });
+            t += gaps[k as usize % 2];
+            assert!(state.history.len() <= CAPACITY, "{} entries, gaps {gaps:?}", state.history.len());
+            let (piece, _) = state.piece(&actuator, t, Ramp::default(), 1.0);
+            let late = (t - delay).max(0.0) - piece.at(0.0);
+            assert!((-1e-9..=gaps[0] + gaps[1] + part).contains(&late), "{late} s late at {t} s, gaps {gaps:?}");
+        }
+    }
+}
