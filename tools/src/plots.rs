@@ -6,7 +6,7 @@ mod run;
 pub(crate) use page::{Page, assemble};
 pub(crate) use run::page;
 
-use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Mode, Orientation, Title};
+use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Marker, MarkerSymbol, Mode, Orientation, Title};
 use plotly::layout::{Axis, AxisType, Layout, Legend, Margin};
 use plotly::{HeatMap, Plot, Scatter};
 
@@ -30,13 +30,31 @@ pub(crate) struct Curve {
     y: Vec<f64>,
     color: &'static str,
     dash: DashType,
+    mode: Mode,
+    symbol: MarkerSymbol,
 }
 
 impl Curve {
     /// A solid line. Of long curves every peak is kept, whatever is left out.
     pub(crate) fn new(name: impl Into<String>, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
         let (x, y) = thinned(x, y);
-        Self { name: name.into(), x, y, color, dash: DashType::Solid }
+        let (mode, symbol) = (Mode::Lines, MarkerSymbol::Circle);
+        Self { name: name.into(), x, y, color, dash: DashType::Solid, mode, symbol }
+    }
+
+    /// A line with its points: one that has a neighbour on neither side is seen as well.
+    pub(crate) fn with_points(self) -> Self {
+        Self { mode: Mode::LinesMarkers, ..self }
+    }
+
+    /// Points without a line: samples that do not follow from each other.
+    pub(crate) fn points(self) -> Self {
+        Self { mode: Mode::Markers, ..self }
+    }
+
+    /// Crosses without a line: what happened where there is no value.
+    pub(crate) fn crosses(self) -> Self {
+        Self { symbol: MarkerSymbol::X, ..self.points() }
     }
 
     pub(crate) fn dashed(self) -> Self {
@@ -90,7 +108,11 @@ pub(crate) fn chart(labels: [&str; 3], axes: [&str; 2], curves: Vec<Curve>) -> C
     let mut plot = Plot::new();
     for curve in curves {
         let line = Line::new().color(curve.color).dash(curve.dash).width(2.0);
-        plot.add_trace(Scatter::new(curve.x, curve.y).mode(Mode::Lines).name(curve.name).line(line));
+        let trace = Scatter::new(curve.x, curve.y).mode(curve.mode.clone()).name(curve.name).line(line);
+        plot.add_trace(match curve.mode {
+            Mode::Lines => trace,
+            _ => trace.marker(Marker::new().color(curve.color).symbol(curve.symbol).size(6)),
+        });
     }
     Chart::new(labels, axes, plot)
 }
