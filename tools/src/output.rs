@@ -1,6 +1,6 @@
 //! What a person sees on the terminal: results on stdout, progress on stderr.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -28,6 +28,14 @@ impl Output {
         let bar = ProgressBar::new_spinner().with_message(message.to_owned());
         bar.enable_steady_tick(Duration::from_millis(100));
         bar
+    }
+
+    /// A line of progress for whoever reads stderr from a file, where bars are invisible.
+    pub fn milestone(&self, text: &str) {
+        let mut stderr = std::io::stderr().lock();
+        if !self.quiet && !stderr.is_terminal() {
+            let _closed = writeln!(stderr, "{text}");
+        }
     }
 
     /// A bar over a known number of steps.

@@ -84,14 +84,15 @@ pub struct Verdict {
     pub unseen: Vec<f64>,
 }
 
-/// Tunes and writes set, page and checkpoint.
-pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<()> {
+/// Tunes and writes set, page and checkpoint; gives whether all evaluations were made.
+pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<bool> {
     let begin = Instant::now();
     let names: Vec<String> = setup.space.dimensions.iter().map(|side| side.name.clone()).collect();
     let present = dimensions::present(&setup.space, &setup.set)?;
     let training = Fitness::training(setup.fitness, &setup.road, &setup.set, setup.step, &names)?;
     let checkpoint = file.with_extension("checkpoint.json");
     let mut tuning = Checkpoint::start(setup, &present, args.resume, &checkpoint)?;
+    let earlier = tuning.search.evaluations();
     search(&mut tuning, &training, &checkpoint, output)?;
     let seconds = begin.elapsed().as_secs_f64();
 
@@ -111,24 +112,24 @@ pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<()
     }
     let pictures = args.page.clone().unwrap_or_else(|| file.with_extension("html"));
     write_whole(&pictures, page::of(&tuning, &verdict).as_bytes())?;
-    output.line(&format!(
-        "{} of {} evaluations in {seconds:.0} s, seed {}",
-        search.evaluations(),
-        search.budget(),
-        setup.seed
-    ));
+    let (evaluations, budget) = (search.evaluations(), search.budget());
+    // The time is that of this run alone.
+    let now = if earlier > 0 { format!(", {} of them now,", evaluations - earlier) } else { String::new() };
+    output.line(&format!("{evaluations} of {budget} evaluations{now} in {seconds:.0} s, seed {}", setup.seed));
     if !search.finished() {
         output.line("stopped early; the same command with --resume goes on");
     }
     output.line(&format!("parameter set: {}", shown(file)));
     output.line(&format!("plots: {}", shown(&pictures)));
-    Ok(())
+    Ok(search.finished())
 }
 
 fn search(tuning: &mut Checkpoint, fitness: &Fitness, checkpoint: &Path, output: &Output) -> Result<()> {
     let bar = output.bar("tuning", tuning.search.budget() as u64);
     bar.set_position(tuning.search.evaluations() as u64);
     bar.reset_eta();
+    let (begin, earlier) = (Instant::now(), tuning.search.evaluations());
+    let tenths = |evaluations: usize, budget: usize| 10 * evaluations / budget;
     let stop = interrupt::flag()?;
     while !tuning.search.finished() && !stop.raised() {
         let points = tuning.search.ask();
@@ -141,9 +142,16 @@ fn search(tuning: &mut Checkpoint, fitness: &Fitness, checkpoint: &Path, output:
                 value
             })
             .collect();
+        let before = tuning.search.evaluations();
         tuning.tell(points, &values, checkpoint)?;
         let best = tuning.search.best().map_or(f64::NAN, |best| best.value);
         bar.set_message(format!("tuning, best {best:.4}, {:.0} s left", bar.eta().as_secs_f64()));
+        let (evaluations, budget) = (tuning.search.evaluations(), tuning.search.budget());
+        if tenths(evaluations, budget) > tenths(before, budget) {
+            let each = begin.elapsed().as_secs_f64() / (evaluations - earlier) as f64;
+            let left = each * (budget - evaluations) as f64;
+            output.milestone(&format!("tuning: {evaluations} of {budget}, best {best:.4}, {left:.0} s left"));
+        }
     }
     bar.finish_and_clear();
     Ok(())
