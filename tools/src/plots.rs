@@ -117,12 +117,14 @@ pub(crate) fn chart(labels: [&str; 3], axes: [&str; 2], curves: Vec<Curve>) -> C
     Chart::new(labels, axes, plot)
 }
 
-/// A map of values over two quantities; `z` has a row for each value of `y`.
-pub(crate) fn heat_map(labels: [&str; 3], axes: [&str; 2], x: &[f64], y: &[f64], z: Vec<Vec<f64>>) -> Chart {
+/// A map of values over two quantities; `z` has a row for each value of `y`. Its colours run from 0 to `most`, so that maps can be
+/// compared; its axes end at the outermost values, in the middle of their cells.
+pub(crate) fn heat_map(labels: [&str; 3], axes: [&str; 2], [x, y]: [&[f64]; 2], z: Vec<Vec<f64>>, most: f64) -> Chart {
     let mut plot = Plot::new();
     let scale = ColorScale::Palette(ColorScalePalette::Viridis);
-    plot.add_trace(HeatMap::new(x.to_vec(), y.to_vec(), z).color_scale(scale));
-    Chart::new(labels, axes, plot)
+    plot.add_trace(HeatMap::new(x.to_vec(), y.to_vec(), z).color_scale(scale).zmin(0.0).zmax(most));
+    let ends = |values: &[f64]| Some([*values.first()?, *values.last()?]);
+    Chart::new(labels, axes, plot).zoomed(ends(x), ends(y))
 }
 
 impl Chart {
