@@ -22,7 +22,8 @@ a { color: var(--accent); }
 table { border-collapse: collapse; font-size: .92rem; }
 th, td { text-align: left; vertical-align: top; padding: .35rem .8rem .35rem 0; border-bottom: 1px solid var(--rule); }
 th { color: var(--soft); font-weight: 600; }
-td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
+td.number { white-space: nowrap; }
 code { font: .92em ui-monospace, monospace; }
 pre { background: var(--panel); border-radius: 6px; padding: .8rem 1rem; overflow-x: auto; }
 .what { min-width: 15rem; }

@@ -22,6 +22,8 @@ pub mod tune;
 pub mod workspace;
 pub mod xml;
 
+use std::process::ExitCode;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
@@ -59,8 +61,8 @@ enum Command {
 }
 
 impl Cli {
-    /// Runs the command that was asked for.
-    pub fn run(&self) -> Result<()> {
+    /// Runs the command that was asked for; gives what the program tells its caller.
+    pub fn run(&self) -> Result<ExitCode> {
         let output = Output::default();
         match &self.command {
             Command::Bench(args) => bench::run(args, &output),
@@ -72,7 +74,8 @@ impl Cli {
             Command::Robustness(args) => robustness::run(args, &output),
             Command::Simulate(args) => simulate::run(args, &output),
             Command::Train(args) => train::run(args, &output),
-            Command::Tune(args) => tune::run(args, &output),
-        }
+            Command::Tune(args) => return tune::run(args, &output),
+        }?;
+        Ok(ExitCode::SUCCESS)
     }
 }

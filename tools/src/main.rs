@@ -7,7 +7,7 @@ use clap::Parser;
 
 fn main() -> ExitCode {
     match fmu_tools::Cli::parse().run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             let _closed = writeln!(std::io::stderr().lock(), "error: {error:#}");
             ExitCode::FAILURE

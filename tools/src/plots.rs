@@ -6,7 +6,7 @@ mod run;
 pub(crate) use page::{Page, assemble};
 pub(crate) use run::page;
 
-use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Mode, Orientation, Title};
+use plotly::common::{ColorScale, ColorScalePalette, DashType, Line, Marker, MarkerSymbol, Mode, Orientation, Title};
 use plotly::layout::{Axis, AxisType, Layout, Legend, Margin};
 use plotly::{HeatMap, Plot, Scatter};
 
@@ -30,13 +30,31 @@ pub(crate) struct Curve {
     y: Vec<f64>,
     color: &'static str,
     dash: DashType,
+    mode: Mode,
+    symbol: MarkerSymbol,
 }
 
 impl Curve {
     /// A solid line. Of long curves every peak is kept, whatever is left out.
     pub(crate) fn new(name: impl Into<String>, x: &[f64], y: Vec<f64>, color: &'static str) -> Self {
         let (x, y) = thinned(x, y);
-        Self { name: name.into(), x, y, color, dash: DashType::Solid }
+        let (mode, symbol) = (Mode::Lines, MarkerSymbol::Circle);
+        Self { name: name.into(), x, y, color, dash: DashType::Solid, mode, symbol }
+    }
+
+    /// A line with its points: one that has a neighbour on neither side is seen as well.
+    pub(crate) fn with_points(self) -> Self {
+        Self { mode: Mode::LinesMarkers, ..self }
+    }
+
+    /// Points without a line: samples that do not follow from each other.
+    pub(crate) fn points(self) -> Self {
+        Self { mode: Mode::Markers, ..self }
+    }
+
+    /// Crosses without a line: what happened where there is no value.
+    pub(crate) fn crosses(self) -> Self {
+        Self { symbol: MarkerSymbol::X, ..self.points() }
     }
 
     pub(crate) fn dashed(self) -> Self {
@@ -90,17 +108,23 @@ pub(crate) fn chart(labels: [&str; 3], axes: [&str; 2], curves: Vec<Curve>) -> C
     let mut plot = Plot::new();
     for curve in curves {
         let line = Line::new().color(curve.color).dash(curve.dash).width(2.0);
-        plot.add_trace(Scatter::new(curve.x, curve.y).mode(Mode::Lines).name(curve.name).line(line));
+        let trace = Scatter::new(curve.x, curve.y).mode(curve.mode.clone()).name(curve.name).line(line);
+        plot.add_trace(match curve.mode {
+            Mode::Lines => trace,
+            _ => trace.marker(Marker::new().color(curve.color).symbol(curve.symbol).size(6)),
+        });
     }
     Chart::new(labels, axes, plot)
 }
 
-/// A map of values over two quantities; `z` has a row for each value of `y`.
-pub(crate) fn heat_map(labels: [&str; 3], axes: [&str; 2], x: &[f64], y: &[f64], z: Vec<Vec<f64>>) -> Chart {
+/// A map of values over two quantities; `z` has a row for each value of `y`. Its colours run from 0 to `most`, so that maps can be
+/// compared; its axes end at the outermost values, in the middle of their cells.
+pub(crate) fn heat_map(labels: [&str; 3], axes: [&str; 2], [x, y]: [&[f64]; 2], z: Vec<Vec<f64>>, most: f64) -> Chart {
     let mut plot = Plot::new();
     let scale = ColorScale::Palette(ColorScalePalette::Viridis);
-    plot.add_trace(HeatMap::new(x.to_vec(), y.to_vec(), z).color_scale(scale));
-    Chart::new(labels, axes, plot)
+    plot.add_trace(HeatMap::new(x.to_vec(), y.to_vec(), z).color_scale(scale).zmin(0.0).zmax(most));
+    let ends = |values: &[f64]| Some([*values.first()?, *values.last()?]);
+    Chart::new(labels, axes, plot).zoomed(ends(x), ends(y))
 }
 
 impl Chart {

@@ -64,7 +64,7 @@ pub struct Progress {
     pub evaluations: usize,
     /// Least value so far.
     pub best: f64,
-    /// Middle value of the generation.
+    /// Middle value of what was evaluated of the generation.
     pub median: f64,
 }
 
@@ -173,10 +173,12 @@ impl Search {
             Strategy::Guided(strategy) => strategy.tell(&evaluated),
         }
         self.evaluations += values.len();
-        let mut sorted: Vec<f64> = evaluated.iter().map(|one| one.value).collect();
+        // Without the members that the budget cut off, whose stand-in would become the middle of a generation cut short.
+        let mut sorted: Vec<f64> = evaluated.iter().take(values.len()).map(|one| one.value).collect();
         sorted.sort_by(f64::total_cmp);
         let best = self.best.as_ref().map_or(REFUSED, |best| best.value);
-        self.history.push(Progress { evaluations: self.evaluations, best, median: sorted[sorted.len() / 2] });
+        let median = sorted.get(sorted.len() / 2).copied().unwrap_or(REFUSED);
+        self.history.push(Progress { evaluations: self.evaluations, best, median });
     }
 
     /// One generation, evaluated by all threads; `f` sees points of the unit cube.

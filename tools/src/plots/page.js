@@ -29,7 +29,8 @@ function draw(id) {
   const css = getComputedStyle(root);
   const ink = css.getPropertyValue('--ink').trim(), rule = css.getPropertyValue('--rule').trim();
   const soft = css.getPropertyValue('--soft').trim();
-  const axis = old => ({...old, gridcolor: rule, zerolinecolor: rule, linecolor: rule, automargin: true,
+  // With automargin, a title that keeps its distance moves the margin instead of running into the numbers.
+  const axis = old => ({...old, title: {...old.title, standoff: 10}, gridcolor: rule, zerolinecolor: rule, linecolor: rule, automargin: true,
     ...(old.type === 'log' ? {exponentformat: 'power'} : {})});
   const layout = {...plot.layout, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', font: {color: ink},
     modebar: {bgcolor: 'rgba(0,0,0,0)', color: soft, activecolor: ink},

@@ -23,6 +23,10 @@ use crate::workspace::shown;
 use cases::{Case, Verdict, measure};
 use sweep::Series;
 
+/// Digits behind the point of figures in tables, and the most where a figure is as good as its limit.
+const DIGITS: usize = 2;
+const MOST_DIGITS: usize = 9;
+
 /// Shows what delay, lag, noise, wind, slopes and lack of grip do to the closed loop.
 #[derive(Clone, Debug, Parser)]
 #[command(after_help = "\
@@ -160,12 +164,13 @@ fn rows(verdicts: &[Verdict]) -> Vec<Vec<String>> {
     let row = |verdict: &Verdict| {
         let Verdict { case, .. } = verdict;
         let (worst, figure) = verdict.worst();
+        let digits = digits(case, figure);
         let passed = verdict.passed().map_or("", |passed| if passed { "passed" } else { "FAILED" });
         vec![
             case.asked.to_owned(),
             case.name.to_owned(),
-            case.limit.map_or(String::new(), |limit| format!("{:.2}", limit * case.unit.1)),
-            shown_figure(case, figure),
+            case.limit.map_or(String::new(), |limit| shown_figure(case, limit, digits)),
+            shown_figure(case, figure, digits),
             case.unit.0.to_owned(),
             passed.to_owned(),
             case.scenarios[worst].name.clone(),
@@ -174,8 +179,14 @@ fn rows(verdicts: &[Verdict]) -> Vec<Vec<String>> {
     std::iter::once(head).chain(verdicts.iter().map(row)).collect()
 }
 
-fn shown_figure(case: &Case, figure: f64) -> String {
-    if figure.is_finite() { format!("{:.2}", figure * case.unit.1) } else { "lost".to_owned() }
+fn shown_figure(case: &Case, figure: f64, digits: usize) -> String {
+    if figure.is_finite() { format!("{:.digits$}", figure * case.unit.1) } else { "lost".to_owned() }
+}
+
+/// Digits behind the point that tell a figure from its limit, of which some are reached to a rounding.
+fn digits(case: &Case, figure: f64) -> usize {
+    let differ = |limit: f64, digits: usize| shown_figure(case, limit, digits) != shown_figure(case, figure, digits);
+    case.limit.and_then(|limit| (DIGITS..=MOST_DIGITS).find(|digits| differ(limit, *digits))).unwrap_or(DIGITS)
 }
 
 /// Every run of one case.
@@ -187,13 +198,14 @@ fn one_case(args: &Args, name: &str, output: &Output) -> Result<()> {
     };
     let verdict = judge(vec![case], args.step, &args.set, output)?.pop().context("one case has one verdict")?;
     let Verdict { case, figures } = &verdict;
-    let limit = case.limit.map_or(String::new(), |limit| format!(" (at most {:.2})", limit * case.unit.1));
+    let digits = digits(case, verdict.worst().1);
+    let limit = case.limit.map_or(String::new(), |limit| format!(" (at most {})", shown_figure(case, limit, digits)));
     output.line(&format!("{}, {}{limit}\n", case.asked, case.unit.0));
     let rows: Vec<Vec<String>> = case
         .scenarios
         .iter()
         .zip(figures)
-        .map(|(scenario, figure)| vec![scenario.name.clone(), shown_figure(case, *figure)])
+        .map(|(scenario, figure)| vec![scenario.name.clone(), shown_figure(case, *figure, digits)])
         .collect();
     for line in table(&rows) {
         output.line(&line);
@@ -205,4 +217,22 @@ fn one_case(args: &Args, name: &str, output: &Output) -> Result<()> {
         output.line(&format!("\nsamples of {}: {}", case.scenarios[worst].name, shown(file)));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_is_told_from_its_limit() {
+        let case = Case { limit: Some(0.03), unit: ("cm", 100.0), ..cases::all().swap_remove(0) };
+        let shown = |figure: f64| {
+            let digits = digits(&case, figure);
+            [0.03, figure].map(|value| shown_figure(&case, value, digits))
+        };
+        assert_eq!(shown(0.02), ["3.00", "2.00"]);
+        assert_eq!(shown(0.029_999), ["3.0000", "2.9999"]);
+        assert_eq!(shown(0.03), ["3.00", "3.00"]);
+        assert_eq!(shown(f64::INFINITY), ["3.00", "lost"]);
+    }
 }

@@ -79,7 +79,9 @@ const CURVE_LABELS: [Labels; 7] = [
 
 /// Charts of the sweeps.
 pub(crate) fn charts(series: &[Series]) -> Vec<Chart> {
-    let grids = GRIDS.into_iter().zip(GRID_LABELS).map(|(name, labels)| grid(labels, &of(series, name)));
+    let drawn = GRIDS.into_iter().flat_map(|name| of(series, name)).flat_map(|line| &line.points);
+    let most = drawn.map(|(_, figures)| shown(figures)).fold(0.0, f64::max);
+    let grids = GRIDS.into_iter().zip(GRID_LABELS).map(|(name, labels)| grid(labels, &of(series, name), most));
     let curves = CURVE_LABELS.iter().flat_map(|labels| curves(labels, &of(series, labels.sweep)));
     grids.chain(curves).collect()
 }
@@ -88,12 +90,19 @@ fn of<'a>(series: &'a [Series], sweep: &str) -> Vec<&'a Series> {
     series.iter().filter(|series| series.sweep == sweep).collect()
 }
 
-fn grid(labels: [&str; 3], lines: &[&Series]) -> Chart {
+/// Lateral error as the grids show it [cm].
+fn shown(figures: &Figures) -> f64 {
+    (100.0 * figures.e_y).min(TOP)
+}
+
+/// Lateral error over delay and lag; `most` is the largest of all grids [cm].
+fn grid(labels: [&str; 3], lines: &[&Series], most: f64) -> Chart {
     let delays: Vec<f64> =
         lines.first().map(|line| line.points.iter().map(|(delay, _)| 1e3 * delay).collect()).unwrap_or_default();
     let lags: Vec<f64> = lines.iter().map(|line| line.lag).collect();
-    let row = |line: &&Series| line.points.iter().map(|(_, figures)| (100.0 * figures.e_y).min(TOP)).collect();
-    heat_map(labels, ["delay [ms]", "lag of the steering [s]"], &delays, &lags, lines.iter().map(row).collect())
+    let row = |line: &&Series| line.points.iter().map(|(_, figures)| shown(figures)).collect();
+    let axes = ["delay [ms]", "lag of the steering [s]"];
+    heat_map(labels, axes, [&delays, &lags], lines.iter().map(row).collect(), most)
 }
 
 /// Lateral and speed error over one quantity.

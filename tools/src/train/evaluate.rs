@@ -127,7 +127,10 @@ impl Report {
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let mut section = |title: &str, rows: &mut dyn Iterator<Item = (&str, Score)>| {
-            let mut cells = vec![HEAD.map(str::to_owned).to_vec()];
+            // Quantity above axle: the terminal is narrow.
+            let split = HEAD.map(|name| name.rsplit_once(' ').unwrap_or_default());
+            let mut cells = vec![split.map(|(quantity, _)| quantity.to_owned()).to_vec()];
+            cells.push(split.map(|(_, axle)| axle.to_owned()).to_vec());
             cells.extend(rows.map(|(name, score)| row(name, &score)));
             lines.push(format!("\n{title}"));
             lines.extend(table(&cells));
@@ -138,14 +141,26 @@ impl Report {
         let bands = &mut self.bands.iter().map(|(name, score)| (name.as_str(), *score));
         section("within 90 % of grip, free-running, in parts", bands);
         lines.push(
-            "\nFront / rear. RMSE and worst in kN/rad; force error rms and worst in % of the axle's grip.".to_owned(),
+            "\nStiffness: RMSE and worst in kN/rad; force: error, rms and worst, in % of the axle's grip.".to_owned(),
         );
         lines
     }
 }
 
 /// Names of the columns.
-pub const HEAD: [&str; 11] = ["", "R2", "", "RMSE", "", "worst", "", "force", "", "worst", ""];
+pub const HEAD: [&str; 11] = [
+    "",
+    "R2 front",
+    "R2 rear",
+    "RMSE front",
+    "RMSE rear",
+    "worst front",
+    "worst rear",
+    "force front",
+    "force rear",
+    "worst force front",
+    "worst force rear",
+];
 
 /// The cells of one score.
 pub fn row(name: &str, score: &Score) -> Vec<String> {

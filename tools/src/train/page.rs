@@ -8,7 +8,7 @@ use super::manoeuvre::Class;
 use super::recipe::T_S;
 use super::score;
 use crate::html::{escape, table};
-use crate::plots::{BLUE, Chart, Curve, ORANGE, assemble, chart};
+use crate::plots::{BLUE, Chart, Curve, GREEN, ORANGE, RED, assemble, chart};
 
 /// Stands for the charts' names in the page's script, one for each class.
 const IDS: [&str; 6] = ["class_a", "class_b", "class_c", "class_d", "class_e", "class_f"];
@@ -59,7 +59,8 @@ fn whole(title: &str, report: &Report, held_out: &[Run], network: &Network, mut 
     }
     let made = &network.document().provenance;
     let lead = format!(
-        "Tyre {}, friction {} to {}. {}. Manoeuvres that took no part in the training. Front and rear; stiffness errors in kN/rad, force errors in % of the axle's grip.",
+        "Tyre {}, friction {} to {}. {}. Manoeuvres that took no part in the training. \
+         Errors of the stiffness (RMSE, worst) in kN/rad, of the force (rms, worst) in % of the axle's grip.",
         made.tyre, made.mu[0], made.mu[1], made.recipe
     );
     assemble(title, &lead, &above, &charts)
@@ -77,8 +78,8 @@ fn over_time(run: &Run, network: &Network, [id, title]: [&'static str; 2]) -> Ch
         vec![
             Curve::new("front", &t, truth(0), BLUE),
             Curve::new("front, network", &t, answer(0), ORANGE).dashed(),
-            Curve::new("rear", &t, truth(1), BLUE),
-            Curve::new("rear, network", &t, answer(1), ORANGE).dashed(),
+            Curve::new("rear", &t, truth(1), GREEN),
+            Curve::new("rear, network", &t, answer(1), RED).dashed(),
         ],
     )
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 
 /// What a shell expects of a program that was interrupted: 128 and the signal's number.
-const INTERRUPTED: i32 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// Whether somebody wants to stop.
 #[derive(Debug, Default)]
@@ -30,7 +30,7 @@ pub fn flag() -> Result<&'static Flag> {
     let taken = TAKEN.get_or_init(|| {
         ctrlc::set_handler(|| {
             if flag.0.swap(true, Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED);
+                std::process::exit(i32::from(INTERRUPTED));
             }
         })
     });

@@ -10,6 +10,7 @@ mod situation;
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::{Result, ensure};
 use clap::Parser;
@@ -36,7 +37,9 @@ Examples:
   cargo fmu tune --resume                              go on after Ctrl-C
   cargo fmu simulate --parameters target/tune/tuned.ssv
   cargo fmu tune --benchmark sphere --seeds 30 --json  medians of the optimisers; --peers adds other people's
-  cargo fmu tune --ask-tell                            candidates and values as lines of JSON; see tools/distributed")]
+  cargo fmu tune --ask-tell                            candidates and values as lines of JSON; see tools/distributed
+
+Ctrl-C ends the generation in hand, saves it with the best so far, and gives the exit code 130; a second one ends at once.")]
 pub struct Args {
     /// What makes a set good
     #[arg(long, value_enum, default_value = "paper")]
@@ -94,19 +97,20 @@ pub struct Args {
     json: bool,
 }
 
-/// Runs the command.
+/// Runs the command; what a person stopped has another exit code than what came to its end.
 ///
 /// # Errors
 /// If a parameter is unknown, the tuning does not fit its checkpoint, or a file cannot be written.
-pub fn run(args: &Args, output: &Output) -> Result<()> {
-    if let Some(function) = args.benchmark {
-        return compare(args, function, output);
-    }
-    let setup = setup(args)?;
-    if args.ask_tell {
-        return ask_tell::run(setup, args, &args.output, std::io::stdin().lock(), std::io::stdout().lock());
-    }
-    session::run(setup, args, &args.output, output)
+pub fn run(args: &Args, output: &Output) -> Result<ExitCode> {
+    let finished = if let Some(function) = args.benchmark {
+        compare(args, function, output).map(|()| true)
+    } else if args.ask_tell {
+        ask_tell::run(setup(args)?, args, &args.output, std::io::stdin().lock(), std::io::stdout().lock())
+            .map(|()| true)
+    } else {
+        session::run(setup(args)?, args, &args.output, output)
+    }?;
+    Ok(if finished { ExitCode::SUCCESS } else { ExitCode::from(interrupt::INTERRUPTED) })
 }
 
 /// What a tuning depends on.

@@ -3,6 +3,7 @@
 use super::session::{Checkpoint, Verdict, figure_rows, parameter_rows};
 use crate::html::{escape, table};
 use crate::optimise::Candidate;
+use crate::optimise::search::Progress;
 use crate::plots::{BLUE, Chart, Curve, GREY, ORANGE, assemble, chart};
 
 /// The page.
@@ -41,6 +42,9 @@ pub fn html_table(rows: &[Vec<String>]) -> String {
 fn convergence(tuning: &Checkpoint) -> Chart {
     let history = tuning.search.history();
     let x: Vec<f64> = history.iter().map(|progress| progress.evaluations as f64).collect();
+    let curve = |name: &str, value: fn(&Progress) -> f64, color| {
+        Curve::new(name, &x, history.iter().map(value).collect(), color).with_points()
+    };
     chart(
         [
             "convergence",
@@ -49,8 +53,8 @@ fn convergence(tuning: &Checkpoint) -> Chart {
         ],
         ["evaluations", "fitness"],
         vec![
-            Curve::new("middle of the generation", &x, history.iter().map(|progress| progress.median).collect(), GREY),
-            Curve::new("best so far", &x, history.iter().map(|progress| progress.best).collect(), BLUE),
+            curve("middle of the generation", |progress| progress.median, GREY),
+            curve("best so far", |progress| progress.best, BLUE),
         ],
     )
     .log_y()
@@ -80,7 +84,7 @@ fn spread(tuning: &Checkpoint) -> Vec<Chart> {
                     "The best tenth of all candidates in their order.",
                 ],
                 ["evaluation", &side.name],
-                vec![Curve::new("candidates", &x, y, ORANGE)],
+                vec![Curve::new("candidates", &x, y, ORANGE).points()],
             );
             if side.logarithmic { drawn.log_y() } else { drawn }
         })

@@ -12,8 +12,8 @@ use super::{Args, dimensions, interrupt, page};
 use crate::archive::{read_text, write_whole};
 use crate::interface::Interface;
 use crate::optimise::search::Method;
-use crate::optimise::{Candidate, Search, Space};
-use crate::output::{Output, table};
+use crate::optimise::{Candidate, Dimension, Search, Space};
+use crate::output::{Output, number, percent, table};
 use crate::parameter_set::ParameterSet;
 use crate::workspace::{CONTROLLER, shown};
 
@@ -84,14 +84,15 @@ pub struct Verdict {
     pub unseen: Vec<f64>,
 }
 
-/// Tunes and writes set, page and checkpoint.
-pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<()> {
+/// Tunes and writes set, page and checkpoint; gives whether all evaluations were made.
+pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<bool> {
     let begin = Instant::now();
     let names: Vec<String> = setup.space.dimensions.iter().map(|side| side.name.clone()).collect();
     let present = dimensions::present(&setup.space, &setup.set)?;
     let training = Fitness::training(setup.fitness, &setup.road, &setup.set, setup.step, &names)?;
     let checkpoint = file.with_extension("checkpoint.json");
     let mut tuning = Checkpoint::start(setup, &present, args.resume, &checkpoint)?;
+    let earlier = tuning.search.evaluations();
     search(&mut tuning, &training, &checkpoint, output)?;
     let seconds = begin.elapsed().as_secs_f64();
 
@@ -111,24 +112,24 @@ pub fn run(setup: Setup, args: &Args, file: &Path, output: &Output) -> Result<()
     }
     let pictures = args.page.clone().unwrap_or_else(|| file.with_extension("html"));
     write_whole(&pictures, page::of(&tuning, &verdict).as_bytes())?;
-    output.line(&format!(
-        "{} of {} evaluations in {seconds:.0} s, seed {}",
-        search.evaluations(),
-        search.budget(),
-        setup.seed
-    ));
+    let (evaluations, budget) = (search.evaluations(), search.budget());
+    // The time is that of this run alone.
+    let now = if earlier > 0 { format!(", {} of them now,", evaluations - earlier) } else { String::new() };
+    output.line(&format!("{evaluations} of {budget} evaluations{now} in {seconds:.0} s, seed {}", setup.seed));
     if !search.finished() {
         output.line("stopped early; the same command with --resume goes on");
     }
     output.line(&format!("parameter set: {}", shown(file)));
     output.line(&format!("plots: {}", shown(&pictures)));
-    Ok(())
+    Ok(search.finished())
 }
 
 fn search(tuning: &mut Checkpoint, fitness: &Fitness, checkpoint: &Path, output: &Output) -> Result<()> {
     let bar = output.bar("tuning", tuning.search.budget() as u64);
     bar.set_position(tuning.search.evaluations() as u64);
     bar.reset_eta();
+    let (begin, earlier) = (Instant::now(), tuning.search.evaluations());
+    let tenths = |evaluations: usize, budget: usize| 10 * evaluations / budget;
     let stop = interrupt::flag()?;
     while !tuning.search.finished() && !stop.raised() {
         let points = tuning.search.ask();
@@ -141,9 +142,16 @@ fn search(tuning: &mut Checkpoint, fitness: &Fitness, checkpoint: &Path, output:
                 value
             })
             .collect();
+        let before = tuning.search.evaluations();
         tuning.tell(points, &values, checkpoint)?;
         let best = tuning.search.best().map_or(f64::NAN, |best| best.value);
         bar.set_message(format!("tuning, best {best:.4}, {:.0} s left", bar.eta().as_secs_f64()));
+        let (evaluations, budget) = (tuning.search.evaluations(), tuning.search.budget());
+        if tenths(evaluations, budget) > tenths(before, budget) {
+            let each = begin.elapsed().as_secs_f64() / (evaluations - earlier) as f64;
+            let left = each * (budget - evaluations) as f64;
+            output.milestone(&format!("tuning: {evaluations} of {budget}, best {best:.4}, {left:.0} s left"));
+        }
     }
     bar.finish_and_clear();
     Ok(())
@@ -157,18 +165,31 @@ pub fn write_set(names: &[String], values: &[f64], file: &Path) -> Result<()> {
     write_whole(file, document.as_bytes())
 }
 
+/// How near its end a parameter of the box has reached it, as a share of the side [1].
+const AT_BOUND: f64 = 0.01;
+
+/// Which end of its side of the box a value has reached: a better one may lie beyond.
+fn bound(side: &Dimension, value: f64) -> &'static str {
+    match side.place(value) {
+        place if place <= AT_BOUND => "lower",
+        place if place >= 1.0 - AT_BOUND => "upper",
+        _ => "",
+    }
+}
+
 /// Parameters before and after, with what the better candidates have in common: a wide range is a parameter that hardly matters.
 pub fn parameter_rows(tuning: &Checkpoint, verdict: &Verdict) -> Vec<Vec<String>> {
     let space = &tuning.setup.space;
     let mut sorted: Vec<&Candidate> = tuning.evaluated.iter().collect();
     sorted.sort_by(|a, b| a.value.total_cmp(&b.value));
     sorted.truncate(tuning.evaluated.len().div_ceil(10));
-    let mut rows = vec![["parameter", "before", "after", "best tenth from", "to"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["parameter", "before", "after", "at its bound", "best tenth from", "to"].map(str::to_owned).to_vec()];
     for (k, side) in space.dimensions.iter().enumerate() {
         let places = || sorted.iter().map(|one| side.value(one.point[k]));
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
-        let numbers = [verdict.present[k], verdict.tuned[k], low, high].map(|value| format!("{value:.4e}"));
-        rows.push([side.name.clone()].into_iter().chain(numbers).collect());
+        let [before, after, low, high] = [verdict.present[k], verdict.tuned[k], low, high].map(number);
+        rows.push(vec![side.name.clone(), before, after, bound(side, verdict.tuned[k]).to_owned(), low, high]);
     }
     rows
 }
@@ -177,7 +198,7 @@ pub fn parameter_rows(tuning: &Checkpoint, verdict: &Verdict) -> Vec<Vec<String>
 pub fn figure_rows(verdict: &Verdict) -> Vec<Vec<String>> {
     let mut rows = vec![["1 = errors of the paper's size", "before", "after", "change"].map(str::to_owned).to_vec()];
     let line = |name: String, before: f64, after: f64| {
-        vec![name, format!("{before:.4}"), format!("{after:.4}"), format!("{:+.0} %", 100.0 * (after / before - 1.0))]
+        vec![name, format!("{before:.4}"), format!("{after:.4}"), percent(after / before - 1.0)]
     };
     let Verdict { training, held_out, seen, unseen, .. } = verdict;
     for (title, fitness, after) in [("tuned on", training, seen), ("not seen", held_out, unseen)] {
@@ -186,4 +207,18 @@ pub fn figure_rows(verdict: &Verdict) -> Vec<Vec<String>> {
         rows.push(line(format!("{title}: fitness"), fitness.score(fitness.present()), fitness.score(after)));
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_that_ends_at_its_bound_is_marked() {
+        let side = Dimension::logarithmic("r_delta", 1e-3, 1e4);
+        assert_eq!(
+            [1e-3, 1.1e-3, 1.5e-3, 1.0, 9.9e3, 1e4].map(|value| bound(&side, value)),
+            ["lower", "lower", "", "", "upper", "upper"]
+        );
+    }
 }

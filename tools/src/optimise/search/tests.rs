@@ -111,3 +111,18 @@ fn the_hundred_iterations_of_the_paper_are_what_the_budget_says() {
     let (at, value) = minimise(|x| (x[0] - 1.0).powi(2) + x[1].powi(2), &space, Method::Guided, 200, 1).unwrap();
     assert!(value < 1e-20 && (at[0] - 1.0).abs() < 1e-9, "{at:?} {value:e}");
 }
+
+#[test]
+fn the_middle_of_a_generation_cut_short_is_that_of_what_was_evaluated() {
+    for method in Method::ALL {
+        // One evaluation, a first generation cut short, a later one cut short.
+        for budget in [1, 3, 30, 103] {
+            let search = run(method, Function::Sphere, 0.0, budget, 1);
+            for Progress { evaluations, best, median } in search.history() {
+                let name = method.name();
+                // The sphere's box ends at 100: five squares of it are the most.
+                assert!(best <= median && *median <= 5e4, "{name}, {evaluations} of {budget}: {median:e}");
+            }
+        }
+    }
+}

@@ -17,7 +17,7 @@ pub fn section(page: &mut Page, learning: &Learning) {
     let head = evaluate::HEAD.map(str::to_owned).to_vec();
     let rows = learning.scores.iter().map(|(name, score)| evaluate::row(name, score));
     page.markup(&numbers(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
-    page.text("Front and rear; RMSE and worst in kN/rad; force error, rms and worst, in % of the axle's grip.\n");
+    page.text("Stiffness: RMSE and worst in kN/rad; force: error, rms and worst, in % of the axle's grip.\n");
     let steps: Vec<f64> = learning.curve.iter().map(|(step, ..)| *step as f64).collect();
     let errors = |pick: fn(&Point) -> f64| learning.curve.iter().map(pick).collect::<Vec<f64>>();
     page.chart(
