@@ -79,7 +79,7 @@ fn closing(packed: &Packed, page: &str, output: &Output) {
     ));
     output.line(
         "Load them in any FMI 2.0 tool: equal names connect. Next:\n  \
-         cargo fmu simulate --road general                 1 km of bends in a gusty wind\n  \
+         cargo fmu simulate --road general                 2 km of bends in a strong wind\n  \
          cargo fmu simulate --set plant.speed=16 --set controller.horizon=20\n  \
          cargo fmu simulate --help",
     );

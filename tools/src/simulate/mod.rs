@@ -28,7 +28,7 @@ use settings::Settings;
 #[command(after_help = "\
 Examples:
   cargo fmu simulate                                    the lane change at 14 m/s, 1 ms steps
-  cargo fmu simulate --road general --step 0.033        1 km of bends in a gusty wind, one whole sample of latency
+  cargo fmu simulate --road general --step 0.033        2 km of bends in a strong wind, one whole sample of latency
   cargo fmu simulate --set plant.speed=16 --set controller.horizon=20
   cargo fmu simulate --set plant.noise_scale=1 --csv run.csv --page run.html
   cargo fmu simulate --road my_track.csv                columns s,kappa,v_x [m, 1/m, m/s]
