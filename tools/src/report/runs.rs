@@ -8,7 +8,7 @@ use vehicle::Vehicle;
 use super::reference::Reference;
 use crate::baselines::Baseline;
 use crate::plots::{BLUE, GREEN, GREY, ORANGE, PURPLE, RED, TEAL};
-use crate::recording::{Recording, Tracking, max, rms};
+use crate::recording::{Recording, Tracking};
 use crate::simulate::build;
 use crate::simulate::native::{Driver, drive_in};
 use crate::simulate::settings::Settings;
@@ -140,19 +140,14 @@ impl Who {
 /// What all tables quote of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Position, heading and speed.
+    /// Position, course, heading and speed.
     pub tracking: Tracking,
-    /// Largest error of the course [rad].
-    pub course_max: f64,
-    /// Root of the mean squared error of the course [rad].
-    pub course_rms: f64,
 }
 
 impl Figures {
     /// Of a recording.
     pub fn of(recording: &Recording) -> Self {
-        let course = recording.course_error();
-        Self { tracking: Tracking::of(recording), course_max: max(&course), course_rms: rms(&course) }
+        Self { tracking: Tracking::of(recording) }
     }
 
     /// Whether the car stayed on the road.
