@@ -10,13 +10,12 @@ use crate::baselines::Baseline;
 use crate::plots::{BLUE, GREEN, GREY, ORANGE, PURPLE, RED, TEAL};
 use crate::recording::{Recording, Tracking};
 use crate::simulate::build;
+pub use crate::simulate::journey::ROAD;
 use crate::simulate::native::{Driver, drive_in};
 use crate::simulate::settings::Settings;
 
 /// Communication step of all comparisons [s]: fine enough that nobody's latency matters.
 pub const STEP: f64 = 0.001;
-/// Lateral error beyond which a car has left the road [m].
-pub const ROAD: f64 = 2.0;
 /// Colour of the nonlinear MPC that has our reference: far from the other seven also for eyes that do not tell red from green.
 const OLIVE: &str = "#7d8f1c";
 

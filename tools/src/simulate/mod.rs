@@ -1,5 +1,6 @@
 //! `cargo fmu simulate`: the closed loop on the cores, at any step, on any road.
 
+pub mod journey;
 pub mod native;
 pub mod settings;
 
@@ -13,12 +14,12 @@ use lpv_mpc::{Adaptation, Controller, Status};
 use vehicle::{Road, Vehicle};
 
 use crate::archive::{read_text, write_whole};
-
 use crate::output::{Output, table};
 use crate::parameter_set::ParameterSet;
 use crate::plots::page;
 use crate::recording::{PAPER, Recording, Tracking, tracking_table};
 use crate::workspace::shown;
+use journey::Progress;
 use settings::Settings;
 
 /// Drives the closed loop natively and prints how well it follows.
@@ -85,17 +86,44 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     ensure!(args.step > 0.0 && args.step <= 1.0, "the step must be above 0 and at most 1 s, got {}", args.step);
     let (mut plant, mut controller) = build(&settings)?;
-    let end = args.stop.unwrap_or_else(|| plant.road().duration());
-    let bar = output.bar("driving", 1000);
+    journey::possible(&plant, args.step, args.stop)?;
     let begin = Instant::now();
-    let recording = native::drive(&mut plant, &mut controller, args.step, args.stop, |t| {
-        // The bar's own thousand parts: a fraction of a run needs no more.
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000")]
-        bar.set_position((1000.0 * t / end) as u64);
-    })?;
-    bar.finish_and_clear();
+    let recording = drive(&mut plant, &mut controller, args, output)?;
     summary(args, &settings, &recording, begin.elapsed().as_secs_f64(), output);
+    let remarks = journey::remarks(&recording, journey::way(&plant), args.stop.is_some());
+    if !remarks.is_empty() {
+        output.line("");
+    }
+    for remark in remarks {
+        output.line(&remark);
+    }
     save(args, &settings, &recording, output)
+}
+
+/// Drives with a bar; a car that makes no progress is given up unless the end is set by time.
+fn drive(plant: &mut Vehicle, controller: &mut Controller, args: &Args, output: &Output) -> Result<Recording> {
+    let end = args.stop.unwrap_or_else(|| journey::time(plant));
+    let bar = output.bar("driving", 1000);
+    let mut progress = Progress::default();
+    let recording = native::drive_while(
+        plant,
+        controller,
+        args.step,
+        args.stop,
+        |_, _, _| {},
+        |t, s| {
+            // The bar's own thousand parts: a fraction of a run needs no more.
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000, and whole seconds")]
+            let (part, second) = ((1000.0 * (t / end).min(1.0)) as u64, t as u64);
+            if part != bar.position() {
+                bar.set_position(part);
+                bar.set_message(format!("driving, {second} s of {end:.0} s, at {s:.0} m"));
+            }
+            progress.goes_on(t, s) || args.stop.is_some()
+        },
+    )?;
+    bar.finish_and_clear();
+    Ok(recording)
 }
 
 /// The network that ships in the controller's FMU.
