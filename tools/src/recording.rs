@@ -166,7 +166,8 @@ impl Tracking {
 
     /// The figures as a person reads them: name, unit, and the value with its digits.
     ///
-    /// The body's heading has no figure of the paper beside it: what the paper reports is compared with the course, as in README.md.
+    /// The body's heading has no figure of the paper beside it: what the paper reports is compared with the course, as in
+    /// README.md.
     pub fn figures(&self) -> [(&'static str, &'static str, String); 8] {
         let heading = |angle: f64| if *self == PAPER { String::new() } else { format!("{:.3}", angle.to_degrees()) };
         [

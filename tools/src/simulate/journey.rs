@@ -55,14 +55,15 @@ pub fn possible(plant: &Vehicle, step: f64, stop: Option<f64>) -> Result<()> {
     } else {
         ensure!(
             wanted_somewhere(plant.road()),
-            "the wanted speed is 0 on the whole road, so the car never arrives: set plant.speed above 0 (in a file the column v_x), \
-             or say by --stop how long it shall stand"
+            "the wanted speed is 0 on the whole road, so the car never arrives: set plant.speed above 0 (in a \
+             file the column v_x), or say by --stop how long it shall stand"
         );
     }
     let samples = stop.unwrap_or_else(|| time(plant)) / step;
     ensure!(
         samples <= SAMPLES_MAX,
-        "{:.0} s at steps of {step} s are {samples:.0} samples, more than the {SAMPLES_MAX} that are kept: take a longer --step or an earlier --stop",
+        "{:.0} s at steps of {step} s are {samples:.0} samples, more than the {SAMPLES_MAX} that are kept: take a \
+         longer --step or an earlier --stop",
         stop.unwrap_or_else(|| time(plant)),
     );
     Ok(())
