@@ -108,6 +108,15 @@ impl Files {
     }
 }
 
+/// Refuses a file that [`write_whole`] could not write, before hours are spent on what is to stand in it.
+pub fn writable(path: &Path) -> Result<()> {
+    ensure!(!path.is_dir(), "{} is a folder: name a file in it", path.display());
+    let folder = path.parent().unwrap_or_else(|| Path::new("."));
+    fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
+    tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{} cannot be written", path.display()))?;
+    Ok(())
+}
+
 /// Writes a file in one go: under a temporary name first, then renamed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
@@ -116,7 +125,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         tempfile::NamedTempFile::new_in(folder).with_context(|| format!("writing into {}", folder.display()))?;
     file.write_all(bytes)?;
     make_readable(file.as_file())?;
-    file.persist(path).with_context(|| format!("writing {}", path.display()))?;
+    // The error of `persist` and its source say the same.
+    file.persist(path).map_err(|error| error.error).with_context(|| format!("writing {}", path.display()))?;
     Ok(())
 }
 
@@ -170,6 +180,17 @@ mod tests {
         assert_eq!(Files::open(&path).unwrap(), sample());
         // The temporary file is gone: the archive is alone in its folder.
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_refused_before() {
+        let folder = tempfile::tempdir().unwrap();
+        writable(&folder.path().join("new/x.csv")).unwrap();
+        assert_eq!(fs::read_dir(folder.path().join("new")).unwrap().count(), 0, "nothing is left behind");
+        let message = format!("{:#}", writable(folder.path()).unwrap_err());
+        assert!(message.ends_with(" is a folder: name a file in it"), "{message}");
+        fs::write(folder.path().join("file"), "").unwrap();
+        assert!(writable(&folder.path().join("file/x.csv")).is_err());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! XML as a tree, read and written. The only file of the tools that knows quick-xml.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use quick_xml::events::{BytesDecl, BytesStart, BytesText, Event};
 use quick_xml::{Reader, Writer, XmlVersion};
 
@@ -79,7 +79,8 @@ impl Element {
         reader.config_mut().trim_text(true);
         let mut open: Vec<Self> = Vec::new();
         loop {
-            let closed = match reader.read_event()? {
+            // The reader's errors repeat their source in what they say.
+            let closed = match reader.read_event().map_err(|error| anyhow!("{error}"))? {
                 Event::Start(start) => {
                     open.push(Self::from_start(&start)?);
                     None

@@ -15,6 +15,17 @@ pub enum Error {
         /// The largest value allowed.
         max: f64,
     },
+    /// A yaw inertia that no vehicle of this mass and size has.
+    #[error(
+        "parameter i_z = {value} lies outside its range {} to {}, a tenth to ten times m l_f l_r = {}",
+        short(0.1 * .inertia), short(10.0 * .inertia), short(*.inertia)
+    )]
+    Inertia {
+        /// The value that was refused [kg m2].
+        value: f64,
+        /// Mass times both distances from the centre of gravity to the axles [kg m2].
+        inertia: f64,
+    },
     /// An input is not a number or lies outside its declared range.
     #[error("input {name} = {value} lies outside its range {min} to {max}")]
     Input {
@@ -69,4 +80,9 @@ pub enum Error {
         /// Time since the start [s].
         time: f64,
     },
+}
+
+/// A number to four digits: those of a bound that has been computed say nothing beyond them.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }

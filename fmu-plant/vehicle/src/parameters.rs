@@ -301,7 +301,9 @@ impl Parameters {
         };
         // The yaw inertia of vehicles is close to m l_f l_r; a factor of ten to either side is no vehicle.
         let inertia = self.m * self.l_f * self.l_r;
-        check("i_z", self.i_z, 0.1 * inertia, 10.0 * inertia)?;
+        if !(0.1 * inertia..=10.0 * inertia).contains(&self.i_z) {
+            return Err(Error::Inertia { value: self.i_z, inertia });
+        }
         // Shorter than 5 cm a tyre's contact patch would be slower than the integrator's step.
         if self.relaxation_length > 0.0 {
             check("relaxation_length", self.relaxation_length, 0.05, Self::MAX.relaxation_length)?;
@@ -327,6 +329,11 @@ mod tests {
         let parameters = Parameters { m: -1575.0, ..Parameters::default() };
         let message = parameters.validate().unwrap_err().to_string();
         assert_eq!(message, "parameter m = -1575 lies outside its range 100 to 50000");
+        let message = Parameters { i_z: 20.0, ..Parameters::default() }.validate().unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "parameter i_z = 20 lies outside its range 302.4 to 30240, a tenth to ten times m l_f l_r = 3024"
+        );
         let parameters = Parameters { tau_delta: f64::NAN, ..Parameters::default() };
         assert!(parameters.validate().is_err(), "NaN accepted");
     }

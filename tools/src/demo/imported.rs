@@ -5,6 +5,7 @@ use anyhow::Result;
 use crate::importer::Instance;
 use crate::interface::Variable;
 use crate::recording::{CONTROLLER_COLUMNS, PLANT_COLUMNS, Recording, Row};
+use crate::simulate::journey::Progress;
 
 /// Variables of one direction: read on one side, written on the other.
 struct Wire {
@@ -40,7 +41,8 @@ impl Wire {
     }
 }
 
-/// Drives two initialised instances until `stop` [s], or until the plant has finished its road if `stop` is not given.
+/// Drives two initialised instances until `stop` [s], or until the plant has finished its road if `stop` is not given; then a car
+/// that makes no progress is given up.
 pub fn drive(
     plant: &mut Instance,
     controller: &mut Instance,
@@ -52,13 +54,16 @@ pub fn drive(
     let mut commands = Wire::new(controller, plant);
     let columns = Columns::new(plant, controller)?;
     let mut recording = Recording::default();
+    let mut progress = Progress::default();
+    let way = plant.interface().variable("s")?.clone();
     let mut steps = 0_u64;
     loop {
         let t = steps as f64 * step;
         recording.rows.push(columns.row(t, plant, controller)?);
         tick(t);
-        let arrived = stop.is_none() && plant.number(&columns.finished)? != 0.0;
-        if arrived || stop.is_some_and(|stop| t + 0.5 * step > stop) {
+        let over =
+            stop.is_none() && (plant.number(&columns.finished)? != 0.0 || !progress.goes_on(t, plant.number(&way)?));
+        if over || stop.is_some_and(|stop| t + 0.5 * step > stop) {
             return Ok(recording);
         }
         // Both outputs are read before either side steps: nobody sees the other's future.

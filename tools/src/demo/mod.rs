@@ -4,6 +4,7 @@ pub mod imported;
 
 use anyhow::Result;
 use clap::Parser;
+use vehicle::{Parameters, Road};
 
 use crate::archive::write_whole;
 use crate::importer::Fmu;
@@ -11,6 +12,7 @@ use crate::output::Output;
 use crate::pack::{Packed, pack};
 use crate::plots::page;
 use crate::recording::{PAPER, Recording, Tracking, tracking_table};
+use crate::simulate::journey;
 use crate::workspace::{archive_folder, shown};
 
 /// Communication steps of the demonstration: a fine one, and the controller's own period, which adds a whole sample of latency.
@@ -27,9 +29,12 @@ pub fn run(_args: &Args, output: &Output) -> Result<()> {
     let packed = pack(output)?;
     let mut runs = vec![("paper", PAPER)];
     let mut shown_run = Recording::default();
+    let mut remarks = Vec::new();
+    let way = Road::named("double_lane_change", &Parameters::default())?.length();
     for (name, step) in STEPS {
         let recording = drive(&packed, step, &[], output)?;
         runs.push((name, Tracking::of(&recording)));
+        remarks.extend(journey::remarks(&recording, way, false).into_iter().map(|remark| format!("{name}: {remark}")));
         if shown_run.rows.is_empty() {
             shown_run = recording;
         }
@@ -37,6 +42,9 @@ pub fn run(_args: &Args, output: &Output) -> Result<()> {
     output.line("\nDouble lane change at 14 m/s, the controller FMU driving the plant FMU\n");
     for line in tracking_table(&runs) {
         output.line(&line);
+    }
+    for remark in remarks {
+        output.line(&remark);
     }
     let file = archive_folder().join("demo.html");
     let lead = "The controller FMU drives the plant FMU through a double lane change at 14 m/s; both were loaded from their packed \
@@ -79,7 +87,7 @@ fn closing(packed: &Packed, page: &str, output: &Output) {
     ));
     output.line(
         "Load them in any FMI 2.0 tool: equal names connect. Next:\n  \
-         cargo fmu simulate --road general                 1 km of bends in a gusty wind\n  \
+         cargo fmu simulate --road general                 2 km of bends in a strong wind\n  \
          cargo fmu simulate --set plant.speed=16 --set controller.horizon=20\n  \
          cargo fmu simulate --help",
     );

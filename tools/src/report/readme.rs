@@ -130,7 +130,7 @@ fn tracking() -> Result<String> {
         [Situation::LaneChange, Situation::General].into_iter().flat_map(|s| STEPS.map(|step| (s, step))).collect();
     let found: Vec<Figures> =
         cases.into_par_iter().map(|(situation, step)| ours(situation, &[], step)).collect::<Result<_>>()?;
-    let paper = Figures { tracking: PAPER, course_max: PAPER.e_psi_max, course_rms: PAPER.e_psi_rms };
+    let paper = Figures { tracking: PAPER };
     let all: Vec<Figures> = std::iter::once(paper).chain(found).collect();
     let row = |name: &str, unit: &str, digits: usize, pick: &dyn Fn(&Figures) -> f64| {
         let cells = all.iter().map(|figures| format!("{:.digits$}", pick(figures)));
@@ -142,8 +142,8 @@ fn tracking() -> Result<String> {
             head.map(str::to_owned).to_vec(),
             row("lateral error, largest", "cm", 2, &|f| 100.0 * f.tracking.e_y_max),
             row("lateral error, rms", "cm", 2, &|f| 100.0 * f.tracking.e_y_rms),
-            row("course error, largest", "deg", 2, &|f| f.course_max.to_degrees()),
-            row("course error, rms", "deg", 3, &|f| f.course_rms.to_degrees()),
+            row("course error, largest", "deg", 2, &|f| f.tracking.course_max.to_degrees()),
+            row("course error, rms", "deg", 3, &|f| f.tracking.course_rms.to_degrees()),
             row("speed error, largest", "m/s", 3, &|f| f.tracking.speed_max),
             row("speed error, rms", "m/s", 4, &|f| f.tracking.speed_rms),
         ],

@@ -8,15 +8,14 @@ use vehicle::Vehicle;
 use super::reference::Reference;
 use crate::baselines::Baseline;
 use crate::plots::{BLUE, GREEN, GREY, ORANGE, PURPLE, RED, TEAL};
-use crate::recording::{Recording, Tracking, max, rms};
+use crate::recording::{Recording, Tracking};
 use crate::simulate::build;
+pub use crate::simulate::journey::ROAD;
 use crate::simulate::native::{Driver, drive_in};
 use crate::simulate::settings::Settings;
 
 /// Communication step of all comparisons [s]: fine enough that nobody's latency matters.
 pub const STEP: f64 = 0.001;
-/// Lateral error beyond which a car has left the road [m].
-pub const ROAD: f64 = 2.0;
 /// Colour of the nonlinear MPC that has our reference: far from the other seven also for eyes that do not tell red from green.
 const OLIVE: &str = "#7d8f1c";
 
@@ -140,19 +139,14 @@ impl Who {
 /// What all tables quote of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Position, heading and speed.
+    /// Position, course, heading and speed.
     pub tracking: Tracking,
-    /// Largest error of the course [rad].
-    pub course_max: f64,
-    /// Root of the mean squared error of the course [rad].
-    pub course_rms: f64,
 }
 
 impl Figures {
     /// Of a recording.
     pub fn of(recording: &Recording) -> Self {
-        let course = recording.course_error();
-        Self { tracking: Tracking::of(recording), course_max: max(&course), course_rms: rms(&course) }
+        Self { tracking: Tracking::of(recording) }
     }
 
     /// Whether the car stayed on the road.

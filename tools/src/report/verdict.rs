@@ -48,15 +48,15 @@ pub fn verdicts(runs: &[Run], [ours, nonlinear]: [&[f64]; 2]) -> Vec<Verdict> {
         verdicts.extend([
             at_most(format!("{title}: speed error, rms"), "m/s", 4, t.speed_rms, PAPER.speed_rms),
             at_most(format!("{title}: lateral error, rms"), "cm", 2, 100.0 * t.e_y_rms, 100.0 * PAPER.e_y_rms),
-            at_most(format!("{title}: course error, rms"), "rad", 4, figures.course_rms, PAPER.e_psi_rms),
+            at_most(format!("{title}: course error, rms"), "rad", 4, t.course_rms, PAPER.course_rms),
             at_most(format!("{title}: speed error, largest"), "m/s", 4, t.speed_max, 0.5 * PAPER.speed_max),
             at_most(format!("{title}: lateral error, largest"), "cm", 2, 100.0 * t.e_y_max, 50.0 * PAPER.e_y_max),
             at_most(
                 format!("{title}: course error, largest"),
                 "deg",
                 2,
-                figures.course_max.to_degrees(),
-                0.5 * PAPER.e_psi_max.to_degrees(),
+                t.course_max.to_degrees(),
+                0.5 * PAPER.course_max.to_degrees(),
             ),
         ]);
     }

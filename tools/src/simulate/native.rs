@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use lpv_mpc::{Controller, Status};
 use vehicle::Vehicle;
 
+use super::journey;
 use crate::recording::{Recording, Row};
 
 /// What can drive the vehicle: it sees what the plant measures and answers with commands, one communication step at a time.
@@ -99,11 +100,27 @@ pub fn drive_in(
     driver: &mut impl Driver,
     step: f64,
     stop: Option<f64>,
-    mut world: impl FnMut(f64, &mut lpv_mpc::Inputs, &mut vehicle::Inputs),
+    world: impl FnMut(f64, &mut lpv_mpc::Inputs, &mut vehicle::Inputs),
     mut tick: impl FnMut(f64),
 ) -> Result<Recording> {
+    let watch = |t, _| {
+        tick(t);
+        true
+    };
+    drive_while(plant, driver, step, stop, world, watch)
+}
+
+/// The same as long as `watch` wants it, which is called after each step with the time [s] and the way along the road [m].
+pub fn drive_while(
+    plant: &mut Vehicle,
+    driver: &mut impl Driver,
+    step: f64,
+    stop: Option<f64>,
+    mut world: impl FnMut(f64, &mut lpv_mpc::Inputs, &mut vehicle::Inputs),
+    mut watch: impl FnMut(f64, f64) -> bool,
+) -> Result<Recording> {
     // A vehicle that never arrives must not run for ever: twice the reference's time is far more than tracking needs.
-    let end = stop.unwrap_or_else(|| 2.0 * plant.road().duration());
+    let end = stop.unwrap_or_else(|| 2.0 * journey::time(plant));
     let mut recording = Recording { rows: vec![row(0.0, plant, driver)] };
     let mut steps = 0_u64;
     loop {
@@ -121,7 +138,9 @@ pub fn drive_in(
         steps += 1;
         let t = steps as f64 * step;
         recording.rows.push(row(t, plant, driver));
-        tick(t);
+        if !watch(t, plant.outputs().s) {
+            return Ok(recording);
+        }
     }
 }
 

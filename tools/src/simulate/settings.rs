@@ -5,6 +5,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use crate::interface::{Interface, Variable};
+
 /// Parameters of both sides, and the road.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -47,12 +49,12 @@ impl Settings {
                 Some(("plant", "road")) => value.trim().clone_into(&mut road),
                 Some(("plant", field)) => {
                     own_preview |= field == "preview_step";
-                    assign(&mut plant, "plant", field, value.trim())?;
+                    assign::<vehicle::Parameters>(&mut plant, "plant", field, value.trim())?;
                 }
                 Some(("controller", "network_file")) => value.trim().clone_into(&mut network_file),
                 Some(("controller", field)) => {
                     other_period |= field == "t_s";
-                    assign(&mut controller, "controller", field, value.trim())?;
+                    assign::<lpv_mpc::Parameters>(&mut controller, "controller", field, value.trim())?;
                 }
                 _ => bail!("a name begins with plant. or controller., got {name}"),
             }
@@ -64,7 +66,19 @@ impl Settings {
         Ok(settings)
     }
 
-    /// All names with their values, for people who look for one.
+    /// All names with their values, units and meanings, for people who look for one.
+    pub fn described(&self) -> Result<Vec<Vec<String>>> {
+        let described = Described::read()?;
+        let mut rows = self.list()?;
+        for row in &mut rows {
+            let variable = row[0].split_once('.').and_then(|(side, name)| described.find(side, name));
+            let unit = variable.and_then(|variable| variable.unit.clone()).unwrap_or_default();
+            row.extend([unit, variable.map(|variable| variable.description.clone()).unwrap_or_default()]);
+        }
+        Ok(rows)
+    }
+
+    /// All names with their values.
     pub fn list(&self) -> Result<Vec<Vec<String>>> {
         let mut rows = vec![
             vec!["plant.road".to_owned(), self.road.clone()],
@@ -80,6 +94,24 @@ impl Settings {
     }
 }
 
+/// Share of the letters from which on two names are alike: with less, a suggestion is farther from what was meant than none.
+const ALIKE: f64 = 0.6;
+
+/// What the FMUs' tables say of each name.
+struct Described([(&'static str, Interface); 2]);
+
+impl Described {
+    fn read() -> Result<Self> {
+        let plant = Interface::parse(include_str!("../../../modelDescription/plant.xml"))?;
+        let controller = Interface::parse(include_str!("../../../modelDescription/controller.xml"))?;
+        Ok(Self([("plant", plant), ("controller", controller)]))
+    }
+
+    fn find(&self, side: &str, name: &str) -> Option<&Variable> {
+        self.0.iter().find(|(known, _)| *known == side)?.1.variable(name).ok()
+    }
+}
+
 fn fields(parameters: &impl Serialize) -> Result<Map<String, Value>> {
     match serde_json::to_value(parameters)? {
         Value::Object(fields) => Ok(fields),
@@ -92,13 +124,21 @@ fn read<T: DeserializeOwned>(fields: Map<String, Value>) -> Result<T> {
 }
 
 /// Puts a text into a field, as what the field is.
-fn assign(fields: &mut Map<String, Value>, side: &str, name: &str, text: &str) -> Result<()> {
+fn assign<T: DeserializeOwned>(fields: &mut Map<String, Value>, side: &str, name: &str, text: &str) -> Result<()> {
     let Some(old) = fields.get_mut(name) else {
+        if let Some(variable) = Described::read()?.find(side, name).filter(|variable| variable.causality == "parameter")
+        {
+            bail!("{side}.{name} is a parameter of the FMU alone, no parameter here: {}", variable.description);
+        }
         let nearest = fields
             .keys()
-            .min_by_key(|known| strsim::damerau_levenshtein(known, name))
-            .map(|known| format!(", did you mean {side}.{known}?"))
-            .unwrap_or_default();
+            .map(|known| (strsim::normalized_damerau_levenshtein(known, name), known))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(likeness, _)| *likeness >= ALIKE)
+            .map_or_else(
+                || ", see cargo fmu simulate --list".to_owned(),
+                |(_, known)| format!(", did you mean {side}.{known}?"),
+            );
         bail!("unknown parameter {side}.{name}{nearest}");
     };
     let wrong = |kind: &str| format!("{side}.{name} takes {kind}, got {text}");
@@ -114,6 +154,10 @@ fn assign(fields: &mut Map<String, Value>, side: &str, name: &str, text: &str) -
         }
         _ => Value::String(text.to_owned()),
     };
+    // A name among others, or a whole number with a range: only the structure knows, and it does not say whose value it refuses.
+    if fields[name].is_string() || fields[name].is_i64() {
+        read::<T>(fields.clone()).with_context(|| format!("{side}.{name}"))?;
+    }
     Ok(())
 }
 
@@ -150,12 +194,34 @@ mod tests {
     }
 
     #[test]
+    fn a_refused_value_is_named() {
+        let message = |assignment| format!("{:#}", set(&[assignment]).unwrap_err());
+        let text = message("controller.adaptation=foo");
+        assert!(text.starts_with("controller.adaptation: unknown variant `foo`, expected one of"), "{text}");
+        let text = message("controller.horizon=-1");
+        assert!(text.starts_with("controller.horizon: invalid value: integer `-1`"), "{text}");
+    }
+
+    #[test]
+    fn every_parameter_of_the_list_is_described() {
+        for row in set(&[]).unwrap().described().unwrap() {
+            assert!(row.len() == 4 && !row[3].is_empty(), "{row:?}");
+        }
+    }
+
+    #[test]
     fn a_misspelt_name_is_answered_with_the_nearest() {
         let message = |assignment| set(&[assignment]).unwrap_err().to_string();
         assert_eq!(
             message("controller.horzion=5"),
             "unknown parameter controller.horzion, did you mean controller.horizon?"
         );
+        assert_eq!(
+            message("controller.hold_preview=true"),
+            "controller.hold_preview is a parameter of the FMU alone, no parameter here: Whether only element 1 of each preview \
+             is given and holds for the others"
+        );
+        assert_eq!(message("plant.colour=red"), "unknown parameter plant.colour, see cargo fmu simulate --list");
         assert_eq!(message("speed=5"), "a name begins with plant. or controller., got speed");
         assert_eq!(message("plant.m=heavy"), "plant.m takes a number, got heavy");
         assert_eq!(message("plant.m"), "expected NAME=VALUE, got plant.m");

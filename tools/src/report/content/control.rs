@@ -23,8 +23,8 @@ pub fn overview(runs: &[Run], situation: Situation) -> Vec<Vec<String>> {
                 format!("{:.2}", 100.0 * t.e_y_max),
                 format!("{:.4}", t.speed_rms),
                 format!("{:.3}", t.speed_max),
-                format!("{:.3}", figures.course_rms.to_degrees()),
-                format!("{:.2}", figures.course_max.to_degrees()),
+                format!("{:.3}", t.course_rms.to_degrees()),
+                format!("{:.2}", t.course_max.to_degrees()),
             ]);
         } else {
             row.push("off the road".to_owned());
@@ -32,7 +32,7 @@ pub fn overview(runs: &[Run], situation: Situation) -> Vec<Vec<String>> {
         }
         row
     };
-    let paper = Figures { tracking: PAPER, course_max: PAPER.e_psi_max, course_rms: PAPER.e_psi_rms };
+    let paper = Figures { tracking: PAPER };
     let mut rows = vec![OVERVIEW.map(str::to_owned).to_vec(), row("paper", &paper)];
     if situation == Situation::General {
         // The paper gives no more of its comparison than these two.

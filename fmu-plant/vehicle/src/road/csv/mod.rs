@@ -1,7 +1,8 @@
 //! Roads from tables of comma-separated values.
 //!
 //! The header names the columns: `x,y,v_x` for points of the line, or `s,kappa,v_x`; `grade`, `bank` (both rad) and `mu`
-//! (a factor on the friction) may follow. Lines that begin with `#` are comments.
+//! (a factor on the friction) may follow; `speed`, `curvature`, capitals and the unit in brackets are understood.
+//! Lines that begin with `#` are comments.
 
 mod smoothing;
 mod spline;

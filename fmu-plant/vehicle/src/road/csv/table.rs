@@ -23,17 +23,22 @@ pub enum Column {
     Friction,
 }
 
-/// Each column's name and the range of its values: what no road exceeds.
-const COLUMNS: [(Column, &str, f64, f64); 8] = [
-    (Column::S, "s", -1e7, 1e7),
-    (Column::Kappa, "kappa", -1.0, 1.0),
-    (Column::X, "x", -1e7, 1e7),
-    (Column::Y, "y", -1e7, 1e7),
-    (Column::Speed, "v_x", 0.0, 100.0),
-    (Column::Grade, "grade", -0.5, 0.5),
-    (Column::Bank, "bank", -0.5, 0.5),
-    (Column::Friction, "mu", 0.0, 2.0),
+/// Each column's name, its unit and the range of its values: what no road exceeds.
+const COLUMNS: [(Column, &str, &str, f64, f64); 8] = [
+    (Column::S, "s", "m", -1e7, 1e7),
+    (Column::Kappa, "kappa", "1/m", -1.0, 1.0),
+    (Column::X, "x", "m", -1e7, 1e7),
+    (Column::Y, "y", "m", -1e7, 1e7),
+    (Column::Speed, "v_x", "m/s", 0.0, 100.0),
+    (Column::Grade, "grade", "rad", -0.5, 0.5),
+    (Column::Bank, "bank", "rad", -0.5, 0.5),
+    (Column::Friction, "mu", "1", 0.0, 2.0),
 ];
+
+/// What people also call a column.
+const ALIASES: [(&str, &str); 2] = [("speed", "v_x"), ("curvature", "kappa")];
+/// What separates fields elsewhere.
+const OTHER_SEPARATORS: [(char, &str); 2] = [(';', "semicolons"), ('\t', "tabs")];
 
 /// What a header must hold, one of these.
 const WANTED: [[Column; 3]; 2] = [[Column::S, Column::Kappa, Column::Speed], [Column::X, Column::Y, Column::Speed]];
@@ -57,15 +62,20 @@ impl Table {
         for (line, row) in rows {
             let found = row.split(',').count();
             if found != columns.len() {
-                let reason = format!("{} fields are wanted, {found} found", columns.len());
-                return Err(Error::Csv { line, column: found.min(columns.len() + 1), reason });
+                let missing = columns
+                    .get(found)
+                    .map_or_else(String::new, |(column, _)| format!(": {} is missing", described(*column).1));
+                let wanted = commas_wanted(row).map_or_else(String::new, |reason| format!("; {reason}"));
+                let reason = format!("{} fields are wanted, {found} found{missing}{wanted}", columns.len());
+                return Err(Error::Csv { line, column: found.min(columns.len()) + 1, reason });
             }
             for (i, (field, (column, values))) in row.split(',').map(str::trim).zip(&mut columns).enumerate() {
                 let refuse = |reason| Error::Csv { line, column: i + 1, reason };
                 let value: f64 = field.parse().map_err(|_| refuse(format!("\"{field}\" is not a number")))?;
-                let (_, _, min, max) = described(*column);
+                let (_, name, unit, min, max) = described(*column);
                 if !(min..=max).contains(&value) {
-                    return Err(refuse(format!("{field} lies outside {min} to {max}")));
+                    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+                    return Err(refuse(format!("{name} = {field} lies outside {min} to {max}{unit}")));
                 }
                 values.push(value);
             }
@@ -96,18 +106,46 @@ impl Table {
     }
 }
 
-fn described(column: Column) -> (Column, &'static str, f64, f64) {
+fn described(column: Column) -> (Column, &'static str, &'static str, f64, f64) {
     *COLUMNS.iter().find(|(known, ..)| *known == column).expect("every column is described")
 }
 
+/// A column's name as the table knows it, and the unit that may stand behind it in brackets.
+fn name_and_unit(field: &str) -> (String, Option<&str>) {
+    let (name, unit) = match field.strip_suffix(']').and_then(|field| field.split_once('[')) {
+        Some((name, unit)) => (name.trim_end(), Some(unit.trim())),
+        None => (field, None),
+    };
+    let name = name.to_ascii_lowercase();
+    let known = ALIASES.iter().find(|(alias, _)| *alias == name).map(|(_, known)| (*known).to_owned());
+    (known.unwrap_or(name), unit)
+}
+
+/// What to say of a line whose fields something else separates.
+fn commas_wanted(line: &str) -> Option<String> {
+    let (_, other) = OTHER_SEPARATORS.iter().find(|(separator, _)| line.contains(*separator))?;
+    Some(format!("commas are wanted between the fields, not {other}"))
+}
+
 fn header_columns(line: usize, header: &str) -> Result<Vec<(Column, Vec<f64>)>, Error> {
+    if let Some(reason) = commas_wanted(header).filter(|_| !header.contains(',')) {
+        return Err(Error::Csv { line, column: 1, reason });
+    }
+    if header.split(',').all(|field| field.trim().parse::<f64>().is_ok()) {
+        let reason = "the header is missing: the first line names the columns, s,kappa,v_x or x,y,v_x".to_owned();
+        return Err(Error::Csv { line, column: 1, reason });
+    }
     let mut columns: Vec<(Column, Vec<f64>)> = Vec::new();
     for (i, name) in header.split(',').map(str::trim).enumerate() {
         let refuse = |reason| Err(Error::Csv { line, column: i + 1, reason });
-        let Some(&(column, ..)) = COLUMNS.iter().find(|(_, known, ..)| *known == name) else {
+        let (plain, given) = name_and_unit(name);
+        let Some(&(column, known, unit, ..)) = COLUMNS.iter().find(|(_, known, ..)| *known == plain) else {
             let known = COLUMNS.map(|(_, known, ..)| known).join(", ");
             return refuse(format!("unknown column \"{name}\": known are {known}"));
         };
+        if given.is_some_and(|given| !given.eq_ignore_ascii_case(unit)) {
+            return refuse(format!("\"{name}\" has another unit than {known} is read in: {unit}"));
+        }
         if columns.iter().any(|(other, _)| *other == column) {
             return refuse(format!("column \"{name}\" comes twice"));
         }

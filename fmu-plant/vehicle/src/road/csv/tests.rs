@@ -70,6 +70,16 @@ fn points_of_the_lane_change_give_its_curvature_back() {
 }
 
 #[test]
+fn a_header_is_understood_as_people_write_it() {
+    let rows = "0,0.01,10\n50,0.02,12\n90,0,9\n";
+    let plain = Road::from_csv(&format!("s,kappa,v_x\n{rows}")).unwrap();
+    for header in ["s,curvature,speed", "S [m], Kappa [1/m], V_x [m/s]", "s[m],Curvature,Speed [m/s]"] {
+        let road = Road::from_csv(&format!("{header}\n{rows}")).unwrap();
+        assert_eq!((road.curvature(33.0), road.speed(70.0)), (plain.curvature(33.0), plain.speed(70.0)), "{header}");
+    }
+}
+
+#[test]
 fn bad_tables_are_refused_with_line_and_column() {
     for (text, message) in [
         ("", "road table: it is empty"),
@@ -80,11 +90,25 @@ fn bad_tables_are_refused_with_line_and_column() {
             "road table, line 1, column 1: unknown column \"a\": known are s, kappa, x, y, v_x, grade, bank, mu",
         ),
         ("s,s,v_x\n0,0,1\n", "road table, line 1, column 2: column \"s\" comes twice"),
+        ("s;kappa;v_x\n0;0;1\n", "road table, line 1, column 1: commas are wanted between the fields, not semicolons"),
+        ("s\tkappa\tv_x\n", "road table, line 1, column 1: commas are wanted between the fields, not tabs"),
+        (
+            "s,kappa,v_x\n0;0;10\n",
+            "road table, line 2, column 2: 3 fields are wanted, 1 found: kappa is missing; commas are wanted between the fields, \
+             not semicolons",
+        ),
+        (
+            "0,0,10\n5,0,10\n",
+            "road table, line 1, column 1: the header is missing: the first line names the columns, s,kappa,v_x or x,y,v_x",
+        ),
+        ("x,y,v_x [km/h]\n", "road table, line 1, column 3: \"v_x [km/h]\" has another unit than v_x is read in: m/s"),
+        ("s,kappa,v_x,speed\n", "road table, line 1, column 4: column \"speed\" comes twice"),
+        ("s,kappa,v_x,mu\n0,0,10,3\n", "road table, line 2, column 4: mu = 3 lies outside 0 to 2"),
         ("x,y\n0,0\n", "road table, line 1, column 1: the header must hold either s,kappa,v_x or x,y,v_x"),
         ("s,kappa,v_x\n0,0,10\n\n5,zero,10\n", "road table, line 4, column 2: \"zero\" is not a number"),
-        ("s,kappa,v_x\n0,0,10\n5,0\n", "road table, line 3, column 2: 3 fields are wanted, 2 found"),
+        ("s,kappa,v_x\n0,0,10\n5,0\n", "road table, line 3, column 3: 3 fields are wanted, 2 found: v_x is missing"),
         ("s,kappa,v_x\n0,0,10\n5,0,1,7\n", "road table, line 3, column 4: 3 fields are wanted, 4 found"),
-        ("s,kappa,v_x\n0,0,10\n5,0,NaN\n", "road table, line 3, column 3: NaN lies outside 0 to 100"),
+        ("s,kappa,v_x\n0,0,10\n5,0,NaN\n", "road table, line 3, column 3: v_x = NaN lies outside 0 to 100 m/s"),
         ("s,kappa,v_x\n5,0,10\n5,0,10\n", "road table, line 3, column 1: arc length 5 does not exceed the 5 before it"),
         ("v_x,x,y\n9,0,0\n9,1,0\n9,1,0\n", "road table, line 4, column 2: (1, 0) repeats the point before it"),
         ("x,y,v_x\n0,0,9\n1,0,9\n2,0,9\n", "road table: 3 points are too few for a smooth line: at least 4 are needed"),
