@@ -27,8 +27,8 @@ const STEERED_OVER: f64 = 0.3;
 
 /// Share of the steering's rate that the path may take [1]; the rest is for coming back to it, and for the slip of the tyres.
 ///
-/// Lane change at 14 m/s with a rate of 0.07 rad/s: 8 cm from the path, with 0.85 39, with 1 52, without the limit 29 m (`cargo fmu
-/// simulate --step 0.033 --set plant.delta_rate_max=0.07 --set controller.delta_rate_max=0.07`).
+/// Lane change at 14 m/s with a rate of 0.07 rad/s: 11 cm from the path, with 0.85 39, with 1 52, without the limit 29 m
+/// (`cargo fmu simulate --step 0.033 --set plant.delta_rate_max=0.07 --set controller.delta_rate_max=0.07`).
 const STEERED_SHARE: f64 = 0.7;
 
 /// Speed that stands for no limit [m/s].

@@ -34,8 +34,8 @@ const STANDSTILL: f64 = 0.2;
 /// the speed's sensor.
 ///
 /// In a bend a faster car turns faster against the path. A plan whose steering is at its bounds would step on the gas to come
-/// back to the path: with a steering rate of 0.05 rad/s and without [`crate::ahead`]'s limit a car that is to drive the lane change
-/// at 5 m/s gets to 12.
+/// back to the path: with a steering rate of 0.05 rad/s and without the limit of [`crate::ahead`] a car that is to drive the
+/// lane change at 5 m/s gets to 12.
 const TOO_FAST: f64 = 0.5;
 
 /// A car that is to stand does not want to drive away sooner [s]: at the default rate 0.1 rad are steered meanwhile.
