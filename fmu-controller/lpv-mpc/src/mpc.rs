@@ -179,6 +179,8 @@ impl<const N_X: usize> Mpc<N_X> {
         } else {
             self.schedule.forget();
             self.structured.reset();
+            // What an earlier plan was permitted says nothing of the road of a new one.
+            self.permitted = f64::INFINITY;
             self.expect_steady_driving(guide.clone(), body, &tyres.nominal());
         }
         let stands = self.problem.x_0[V_X].max(self.fastest) < STANDSTILL;
