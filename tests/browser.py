@@ -3,7 +3,6 @@
 import contextlib
 import json
 import pathlib
-import re
 import shutil
 import subprocess
 import tempfile
@@ -13,13 +12,25 @@ import os
 import pytest
 import websocket
 
-# No look-ups and downloads of its own; tests run as root in containers, where Chromium's sandbox does not start.
+# No look-ups and downloads of its own, and no rest for a page that it takes for unseen; tests run as root in containers, where
+# Chromium's sandbox does not start.
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--remote-debugging-port=0",
+    "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding", "--remote-debugging-port=0",
     "--remote-allow-origins=*",
 ]  # fmt: skip
 PATIENCE = 60.0
+# Seconds without a frame after which the browser is believed to draw no more: a frame of our slowest page takes a tenth.
+FRAME = 10.0
+
+
+class Stalled(Exception):
+    """The browser answers but draws no frames: scrolling, sizes and what waits for sight stand still. A matter of headless
+    Chromium and never of a page: tests that may start again in another one are marked with `AGAIN`."""
+
+
+AGAIN = pytest.mark.flaky(reruns=2, only_rerun=Stalled.__name__)
 
 
 def chromium():
@@ -72,6 +83,7 @@ class Tab:
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def open(self, path):
+        self.call("Page.bringToFront")
         self.call("Page.navigate", url=pathlib.Path(path).resolve().as_uri())
         self.wait("document.readyState === 'complete'")
 
@@ -82,10 +94,21 @@ class Tab:
         return answer["result"].get("value")
 
     def wait(self, condition):
-        end = time.monotonic() + PATIENCE
+        start = time.monotonic()
+        checked = start
         while not self.run(condition):
-            assert time.monotonic() < end, f"never became true: {condition}"
+            now = time.monotonic()
+            assert now < start + PATIENCE, f"never became true: {condition}"
+            if now > checked + FRAME:
+                self._expect_frame()
+                checked = now
             time.sleep(0.05)
+
+    def _expect_frame(self):
+        drawn = "new Promise(done => requestAnimationFrame(() => done(true)))"
+        late = f"new Promise(done => setTimeout(() => done(false), {1000 * FRAME}))"
+        if not self.run(f"Promise.race([{drawn}, {late}])"):
+            raise Stalled(f"no frame within {FRAME:.0f} s; the page is {self.run('document.visibilityState')}")
 
     def show(self, element):
         """Scrolls to an element and gives its place on the screen."""
@@ -115,22 +138,29 @@ class Tab:
 def browse():
     """A browser with one empty page."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        program = subprocess.Popen(
-            [chromium(), *FLAGS, f"--user-data-dir={profile}", "about:blank"], stderr=subprocess.PIPE, text=True
-        )
+        profile = pathlib.Path(profile)
+        # Into a file: a pipe that nobody reads would stop the browser when it is full.
+        with open(profile / "complaints.txt", "w") as complaints:
+            program = subprocess.Popen([chromium(), *FLAGS, f"--user-data-dir={profile}", "about:blank"], stderr=complaints)
         try:
-            for line in program.stderr:
-                if found := re.search(r"ws://[^/]+/", line):
-                    break
-            else:
-                pytest.fail("Chromium ended before it listened")
-            browser = websocket.create_connection(re.search(r"ws://\S+", line)[0], timeout=PATIENCE)
+            address = _address(program, profile)
+            browser = websocket.create_connection(address, timeout=PATIENCE)
             browser.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
             while (message := json.loads(browser.recv())).get("id") != 1:
                 pass
             page = next(t for t in message["result"]["targetInfos"] if t["type"] == "page")
-            yield Tab(f"{found[0]}devtools/page/{page['targetId']}")
+            yield Tab(address.partition("devtools")[0] + f"devtools/page/{page['targetId']}")
         finally:
-            program.terminate()
+            program.kill()
             program.wait(timeout=PATIENCE)
-            program.stderr.close()
+
+
+def _address(program, profile):
+    """Where the browser listens: it writes port and path into its profile."""
+    port = profile / "DevToolsActivePort"
+    end = time.monotonic() + PATIENCE
+    while not (port.is_file() and len(lines := port.read_text().split()) == 2):
+        if program.poll() is not None or time.monotonic() > end:
+            pytest.fail(f"Chromium does not listen: {(profile / 'complaints.txt').read_text()[-2000:]}")
+        time.sleep(0.05)
+    return f"ws://127.0.0.1:{lines[0]}{lines[1]}"
