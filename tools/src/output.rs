@@ -38,6 +38,13 @@ impl Output {
         }
     }
 
+    /// A line on stderr beside the results.
+    pub fn remark(&self, text: &str) {
+        if !self.quiet {
+            let _closed = writeln!(std::io::stderr().lock(), "{text}");
+        }
+    }
+
     /// A bar over a known number of steps.
     pub fn bar(&self, message: &str, steps: u64) -> ProgressBar {
         if self.quiet {

@@ -7,6 +7,9 @@
 //! just been written. Everything else of a step is measured with it: the tyres, the prediction over the latency, the linear
 //! models of all stages and their discretisation, the outputs.
 //!
+//! `network now` is the paper's step: one answer of the network for all stages, from the state as it is measured. The filter and
+//! the network along the horizon, both on by default, come on top of it.
+//!
 //! First come the ratios that the question asks for, from turns that all kinds of step take one after the other, so that a
 //! machine that slows down slows all of them; each kind counts with its best turn. Criterion's times follow, per sample.
 

@@ -2,6 +2,7 @@
 
 #![allow(non_snake_case, reason = "matrices keep the paper's capitals")]
 
+mod environment;
 pub mod file;
 mod peers;
 mod report;
@@ -28,9 +29,8 @@ const PLOTTED: usize = 60;
 /// Measure the solvers of the quadratic programme against each other
 ///
 /// All solvers run in one go and take turns, block of problems by block of problems, so that a machine that slows down
-/// slows all of them. A problem's time is its best of all rounds. Peers come from PyPI and report their own times:
-///
-///   python3 -m venv target/peers && target/peers/bin/pip install numpy scipy osqp daqp piqp proxsuite
+/// slows all of them. A problem's time is its best of all rounds. Peers come from PyPI, for which a virtual environment is set up
+/// the first time, and report their own times.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// Recorded problems, in the format of fmu-controller/lpv-mpc/benches/qp/README.md [default: the files beside it]
@@ -45,7 +45,7 @@ pub struct Args {
     /// Problems that a solver solves in a row before the next one has its turn
     #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..))]
     pub block: u32,
-    /// Python with the peers from PyPI [default: target/peers/bin/python, if it is there]
+    /// Python with the peers from PyPI, instead of the one in target/peers that is set up when it is missing
     #[arg(long, value_name = "PROGRAM")]
     pub python: Option<PathBuf>,
     /// Leave the peers from PyPI out
@@ -62,8 +62,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for path in if args.qp.is_empty() { default_files() } else { args.qp.clone() } {
         files.push(File::read(&path)?);
     }
-    let python = if args.without_peers { None } else { peers::python(args.python.as_ref()) };
-    let mut peers = python.map(|python| Peers::start(&python)).transpose()?;
+    let mut peers = start_peers(args, output)?;
     let mut report = Report::default();
     for file in &files {
         let solvers = measure(file, file.horizon, file.problems.len(), args, peers.as_mut(), output)?;
@@ -89,11 +88,23 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.line(&serde_json::to_string_pretty(&report)?);
     } else {
         output.line(&format!("median time over horizon: {}", workspace::shown(&args.plot)));
-        if peers.is_none() && !args.without_peers {
-            output.line("no Python with peers found; `cargo fmu bench --help` says how to install them");
-        }
     }
     Ok(())
+}
+
+/// The peers, unless nobody wants them. Those that nobody named are left out where they cannot be had.
+fn start_peers(args: &Args, output: &Output) -> Result<Option<Peers>> {
+    if args.without_peers {
+        return Ok(None);
+    }
+    if let Some(python) = &args.python {
+        return Peers::start(python).map(Some);
+    }
+    let peers = environment::python(output).and_then(|python| Peers::start(&python));
+    if let Err(reason) = &peers {
+        output.remark(&format!("the peers from PyPI are left out: {reason:#}"));
+    }
+    Ok(peers.ok())
 }
 
 fn default_files() -> Vec<PathBuf> {

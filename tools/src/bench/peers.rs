@@ -1,7 +1,7 @@
 //! Solvers from PyPI in a process of their own, asked for one block of problems at a time.
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result};
@@ -76,10 +76,4 @@ impl Drop for Peers {
         let _already_gone = self.child.kill();
         let _reaped = self.child.wait();
     }
-}
-
-/// The Python to ask: the one given, or that of the virtual environment in `target/peers`, if it is there.
-pub fn python(given: Option<&PathBuf>) -> Option<PathBuf> {
-    let own = workspace::root().join("target").join("peers").join("bin").join("python");
-    given.cloned().or_else(|| own.exists().then_some(own))
 }
