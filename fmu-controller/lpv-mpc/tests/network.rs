@@ -1,8 +1,8 @@
 //! The network that ships, held against the tyre's own formula and against what the controller needs of it.
 
-mod counting;
+use std::hint::black_box;
 
-use counting::allocations;
+use allocation_counter::measure;
 use lpv_mpc::jordan::{Measured, Memory, Network};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -117,6 +117,8 @@ fn inference_allocates_nothing() {
     let network = shipped();
     let measured = motion(16.0, 0.05, 0.05, 0.0);
     let memory = network.nominal();
-    let (count, belief) = allocations(|| network.linearise(&network.step(&memory, &measured), &measured).1);
-    assert_eq!(count, 0, "allocations for {belief:?}");
+    let counted = measure(|| {
+        black_box(network.linearise(&network.step(&memory, &measured), &measured));
+    });
+    assert_eq!(counted.count_total, 0);
 }

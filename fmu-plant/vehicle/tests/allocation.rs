@@ -2,35 +2,9 @@
 
 mod driver;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
+use allocation_counter::measure;
 use driver::{T_S, command, vehicle};
 use vehicle::{Inputs, Parameters};
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// Counts the allocations of the test's own thread.
-struct Counting;
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn steps_and_outputs_do_not_allocate() {
@@ -51,26 +25,29 @@ fn steps_and_outputs_do_not_allocate() {
     for parameters in [Parameters::default(), everything] {
         for road in vehicle::road::NAMES {
             let original = vehicle(road, parameters.clone());
+            let copied = measure(|| drop(std::hint::black_box(original.clone())));
+            assert!(copied.count_total > 0, "nothing is counted");
             // A restored copy must be as quiet as the original.
             for mut vehicle in [original.clone(), original] {
-                let before = ALLOCATIONS.get();
-                for step in 0..200_u32 {
-                    let inputs = command(&vehicle);
-                    let rates = Inputs { delta: 0.01, ..Inputs::ZERO };
-                    let done = if step % 2 == 0 {
-                        vehicle.advance(T_S, &inputs)
-                    } else {
-                        vehicle.advance_along(1e-3, &inputs, &rates)
-                    };
-                    done.unwrap();
-                    std::hint::black_box((
-                        vehicle.measurement(),
-                        vehicle.outputs_rate(&inputs),
-                        vehicle.preview_rate(),
-                    ));
-                    std::hint::black_box(vehicle.outputs_along(&inputs, &rates));
-                }
-                assert_eq!(ALLOCATIONS.get() - before, 0, "{road}");
+                let counted = measure(|| {
+                    for step in 0..200_u32 {
+                        let inputs = command(&vehicle);
+                        let rates = Inputs { delta: 0.01, ..Inputs::ZERO };
+                        let done = if step % 2 == 0 {
+                            vehicle.advance(T_S, &inputs)
+                        } else {
+                            vehicle.advance_along(1e-3, &inputs, &rates)
+                        };
+                        done.unwrap();
+                        std::hint::black_box((
+                            vehicle.measurement(),
+                            vehicle.outputs_rate(&inputs),
+                            vehicle.preview_rate(),
+                        ));
+                        std::hint::black_box(vehicle.outputs_along(&inputs, &rates));
+                    }
+                });
+                assert_eq!(counted.count_total, 0, "{road}");
             }
         }
     }
