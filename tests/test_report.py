@@ -104,6 +104,14 @@ def test_a_phone_sees_no_more_than_its_width(tab):
     assert tab.run("document.documentElement.scrollWidth") <= 390
 
 
+def test_charts_below_the_screen_are_printed(tab):
+    seen = f"{PLOTS}.filter(e => e.offsetParent)"
+    blank = f"{seen}.filter(e => !({MARKS})(e)).length"
+    assert tab.run(blank) > 10
+    tab.call("Page.printToPDF")
+    assert tab.run(blank) == 0
+
+
 def test_data_of_a_chart_are_those_of_its_curves(tab):
     text = tab.run("table(plots['lane_change-wind'].data)")
     rows = list(csv.reader(text.splitlines()))

@@ -37,7 +37,7 @@ nav { display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; padding: .7rem 0; borde
 .tabs button[aria-selected=true] { border-color: var(--accent); color: var(--accent); }
 #theme { position: fixed; right: .8rem; top: .8rem; z-index: 2; padding: .2rem .6rem; }
 @media (max-width: 40rem) { body { padding: 1rem .7rem 3rem; } h1 { padding-right: 2.5rem; } .plot { height: 27rem; } td, th { padding-right: .5rem; } .wide td:not(.number) { min-width: 6rem; } }
-@media print { #theme, nav { display: none; } }
+@media print { #theme, nav, .tabs button:not([aria-selected=true]), .modebar { display: none; } .plot, tr { break-inside: avoid; } h2, h3, .note { break-after: avoid; } }
 ";
 
 /// A whole document; `head` holds scripts, `body` is markup.

@@ -43,11 +43,14 @@ function draw(id) {
   drawn.add(id);
 }
 
+const drawOnce = id => drawn.has(id) || draw(id);
 const redraw = () => drawn.forEach(draw);
 const sight = new IntersectionObserver(entries => entries.forEach(entry => {
-  if (entry.isIntersecting && !drawn.has(entry.target.id)) draw(entry.target.id);
+  if (entry.isIntersecting) drawOnce(entry.target.id);
 }), {rootMargin: '400px'});
 document.querySelectorAll('.plot').forEach(plot => sight.observe(plot));
+// Paper shows what was never scrolled to.
+addEventListener('beforeprint', () => document.querySelectorAll('.plot').forEach(plot => plot.offsetParent && drawOnce(plot.id)));
 
 document.querySelectorAll('[role=tab]').forEach(tab => tab.addEventListener('click', () => {
   tab.parentNode.querySelectorAll('[role=tab]').forEach(other => {
