@@ -24,7 +24,9 @@ type Square<const NZ: usize> = SMatrix<f64, NZ, NZ>;
 /// Doublings at most [1]: 2^30 samples are a year.
 const DOUBLINGS: usize = 30;
 
-/// Relative change that is the last [1]: the doubling converges quadratically, so what is left is its square.
+/// Relative change that is the last [1]: the doubling converges quadratically, so what is left is its square, 1e-12. Along
+/// `cargo fmu simulate --road general --step 0.033 --set controller.terminal_cost=riccati` the commands are within 3e-11 rad or
+/// m/s2 of those with 1e-14, and likewise with 1e-4 to 1e-7; with 1e-2 they are 2e-8 off.
 const CONVERGED: f64 = 1e-6;
 
 /// Relative change up to which the weight of the last state stays [1]: of the speed, by which the lateral modes change by about

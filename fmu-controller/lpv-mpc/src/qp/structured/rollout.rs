@@ -6,7 +6,9 @@ use super::{Problem, Solution, Stage, Structured};
 use crate::lanes::axpy;
 use nalgebra::SVector;
 
-/// Excess over a bound, as a fraction of the input's range, that is rounding and no violation.
+/// Excess over a bound, as a fraction of the input's range, that is rounding and no violation. On random problems (see [`super`])
+/// inputs exceed their bounds by less than 1e-15 or by more than 1e-6, on recorded ones by more than 1e-10. With 1e-13 to 1e-10
+/// all come out alike.
 const ROUNDING: f64 = 1e-11;
 
 /// Side of the soft bound on which a state lies.

@@ -5,7 +5,9 @@ use super::super::rollout;
 use super::response::Response;
 use super::{Active, Problem};
 
-/// Violation of a bound, against its scale, that rounding of multipliers may leave; a sweep makes the plan exact.
+/// Violation of a bound, against its scale, that rounding of multipliers may leave; a sweep makes the plan exact. On random
+/// problems (see [`super::super`]) rounding leaves 1e-16 to 1e-8, less and less often; four of 21 000 largest violations are
+/// between 1e-8 and 1e-5. Recorded ones are below 1e-12 or above 1e-6. With 1e-10 and 1e-8 all come out alike.
 const VIOLATION: f64 = 1e-9;
 
 /// What is bounded.

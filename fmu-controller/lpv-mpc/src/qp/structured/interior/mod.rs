@@ -18,7 +18,9 @@ use nalgebra::SVector;
 // problems: with the iteration counted as two sweeps, N = 40 takes 26 sweeps on average, at most 39; customary values (0.995,
 // third power, three sweeps of a trial, start at 0.05 and 0.1) take 33 and 52.
 
-/// Iterations after which the plan at hand is all there is.
+/// Iterations after which the plan at hand is all there is: twice the most that are seen, 19 on random problems and 13 on
+/// recorded ones. With 20 and 80 all come out alike; with 10 a recorded one with N = 40 takes 75 sweeps and changes instead of
+/// 30.
 const ITERATIONS_MAX: u32 = 40;
 /// Fraction of the way to the nearest bound that a step may go.
 const TO_BOUNDARY: f64 = 0.999;
@@ -29,9 +31,12 @@ const POLISH_BELOW: f64 = 1e-2;
 const POLISH_STATIONARITY: f64 = 5e-2;
 /// Sweeps of a trial.
 const POLISH_SWEEPS: u32 = 2;
-/// Complementarity, against its start, at which rounding ends the method.
+/// Complementarity, against its start, at which rounding ends the method: of a distance that is this share of an input's range,
+/// 450 times the machine's epsilon, less than three digits are left. With 1e-11 and 1e-15 all problems come out alike.
 const CONVERGED: f64 = 1e-13;
-/// Residual up to which the answer counts as optimal.
+/// Residual up to which the answer counts as optimal, as the comparison with Clarabel wants it. The one random problem that comes
+/// to it has a residual above 0.1, and no recorded one does. Of 2283 random ones that all had to, without sweeps and dual active
+/// set, 97 % ended below it and 95 % below 1e-7; below 1e-8 one still cost 5e-9 more than Clarabel's answer.
 const RESIDUAL_MAX: f64 = 1e-6;
 
 /// Distance to a bound, its multiplier, and the target of their product.

@@ -15,7 +15,10 @@ use nalgebra::{Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::estimator;
-use crate::model::{Body, Disturbance, Input, Point, State, Tyres, V_X, V_Y, YAW_RATE};
+use crate::model::{V_Y, YAW_RATE};
+pub use similarity::{Factors, Given};
+
+mod similarity;
 
 /// Smallest and largest factor on the stiffness [1].
 ///
@@ -72,59 +75,6 @@ const MEMORY: f64 = 0.2;
 /// Indices of the factors' excess over 1; before them stands the wind.
 const K: usize = 2;
 const G: usize = 3;
-
-/// What the tyres have over what is believed of them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Factors {
-    /// On the slope at small slip [1].
-    pub stiffness: f64,
-    /// On the largest force [1].
-    pub grip: f64,
-}
-
-impl Factors {
-    /// The slip at which the believed tyre is asked, over the true one [1].
-    pub fn slip(&self) -> f64 {
-        self.stiffness / self.grip
-    }
-
-    /// The line through the force at the true slip, from that of the believed tyre at the slip it is asked at.
-    pub fn apply(&self, believed: &Tyres) -> Tyres {
-        let Self { stiffness, grip } = *self;
-        let Tyres { c_f, c_r, f_f0, f_r0 } = *believed;
-        Tyres { c_f: c_f * stiffness, c_r: c_r * stiffness, f_f0: f_f0 * grip, f_r0: f_r0 * grip }
-    }
-
-    /// These over others.
-    pub fn over(&self, others: &Self) -> Self {
-        Self { stiffness: self.stiffness / others.stiffness, grip: self.grip / others.grip }
-    }
-}
-
-/// What the tyres give, as accelerations on the lateral velocity [m/s2] and on the yaw rate [rad/s2].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Given {
-    /// By their slope.
-    pub slope: Vector2<f64>,
-    /// By their force at zero slip of the affine model.
-    pub offset: Vector2<f64>,
-}
-
-impl Given {
-    /// By these tyres at a state and input.
-    pub fn by(tyres: &Tyres, x: &State, u: &Input, body: &Body) -> Self {
-        let at = Point::new(*x, *u, body);
-        let accelerations = |tyres: &Tyres| {
-            let (rates, _) = at.motion(0.0, tyres, &Disturbance::zeros());
-            // Turning with the body is no force.
-            Vector2::new(rates[V_Y] + x[YAW_RATE] * x[V_X], rates[YAW_RATE])
-        };
-        Self {
-            slope: accelerations(&Tyres::secant(tyres.c_f, tyres.c_r)),
-            offset: accelerations(&Tyres { c_f: 0.0, c_r: 0.0, ..*tyres }),
-        }
-    }
-}
 
 /// The filter of wind and factors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -331,24 +281,5 @@ mod tests {
         };
         assert!(is_near(found(0.1), Factors { stiffness: STIFFNESS[0], grip: GRIP[0] }, 1e-12));
         assert!(is_near(found(4.0), Factors { stiffness: STIFFNESS[1], grip: GRIP[1] }, 1e-12));
-    }
-
-    #[test]
-    fn factors_scale_a_magic_formula_by_similarity() {
-        let believed = |alpha: f64| 7000.0 * (1.4 * (10.0 * alpha).atan()).sin();
-        let found = Factors { stiffness: 0.6, grip: 1.1 };
-        let truth = |alpha: f64| found.grip * believed(found.slip() * alpha);
-        let slope = |f: &dyn Fn(f64) -> f64, alpha: f64| (f(alpha + 1e-6) - f(alpha - 1e-6)) / 2e-6;
-        for k in -10..=10 {
-            let alpha = 0.02 * f64::from(k);
-            let asked = found.slip() * alpha;
-            let c = slope(&believed, asked);
-            let line = Tyres { c_f: c, c_r: 0.0, f_f0: believed(asked) - c * asked, f_r0: 0.0 };
-            let Tyres { c_f, f_f0, .. } = found.apply(&line);
-            // Central differences: 1e-12 of the third derivative, and rounding of 1e-16 over 1e-6 of the force.
-            assert!((c_f - slope(&truth, alpha)).abs() < 1e-4, "{alpha}");
-            assert!((f_f0 + c_f * alpha - truth(alpha)).abs() < 1e-6, "{alpha}");
-        }
-        assert!((slope(&truth, 0.0) - found.stiffness * slope(&believed, 0.0)).abs() < 1e-3);
     }
 }

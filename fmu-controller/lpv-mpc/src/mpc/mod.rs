@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Parameters;
 use crate::caution::caution;
-use crate::feedforward::{Before, FeedForward, Past};
+use crate::feedforward::Past;
 use crate::guide::Guide;
 use crate::hold::Hold;
-use crate::horizon::{NX_LAGS, Surroundings, full_state, linearise, middle, steady_state, vehicle_part};
-use crate::lanes::{Work, widest};
+use crate::horizon::{NX_LAGS, full_state};
+use crate::lanes::widest;
 use crate::latency::Predicted;
 use crate::model::{A_X, Body, DELTA, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y, YAW_RATE};
 use crate::modes::Backend;
@@ -21,6 +21,9 @@ use crate::plan::Plan;
 use crate::qp::{Clarabel, Outcome, Problem, Solution, Structured};
 use crate::recovery::Recovery;
 use crate::terminal::Terminal;
+use stages::Modelling;
+
+mod stages;
 
 /// Solves of the first sample: without a previous plan the schedule has to be found first. Measured on the double lane
 /// change, also from 0.25 m beside the path: the third changes the first command by less than 1e-3 of its bound.
@@ -37,9 +40,6 @@ const STANDSTILL: f64 = 0.2;
 /// back to the path: with a steering rate of 0.05 rad/s and without the limit of [`crate::ahead`] a car that is to drive the
 /// lane change at 5 m/s gets to 12.
 const TOO_FAST: f64 = 0.5;
-
-/// A car that is to stand does not want to drive away sooner [s]: at the default rate 0.1 rad are steered meanwhile.
-const SOON: f64 = 0.13;
 
 /// Tolerance of Clarabel [1]: at its own default of 1e-8 weights over ten decades leave errors of 4 % in the command.
 const CLARABEL_TOLERANCE: f64 = 1e-10;
@@ -241,59 +241,6 @@ impl<const N_X: usize> Mpc<N_X> {
         (self.solution.iterations, self.solution.residual, slack)
     }
 
-    /// A schedule for the first sample: steady cornering on the path, at the speed to be followed.
-    fn expect_steady_driving(&mut self, mut guide: Guide<'_, f64>, body: &Body, tyres: &Tyres) {
-        let mut pace = self.problem.x_0[V_X];
-        for (x, u) in self.plan.x[1..].iter_mut().zip(&mut self.plan.u) {
-            let path = guide.advance(|_| pace);
-            pace = path.v_x;
-            *x = steady_state(path.v_x, path.kappa[1], body, tyres);
-            *u = Input::from([(body.l_f + body.l_r) * path.kappa[0], 0.0]);
-        }
-    }
-
-    /// Fills the stages of the quadratic programme along the schedule.
-    #[inline(always)]
-    fn model(
-        &mut self,
-        (mut guide, recovery): (Guide<'_, f64>, Option<&Recovery>),
-        hold: &Hold,
-        body: &Body,
-        tyres: &mut impl TyreModel,
-    ) {
-        let around = Surroundings { nominal: tyres.nominal(), hold };
-        tyres.restart();
-        (self.fastest, self.permitted) = (0.0, 0.0);
-        self.schedule.take(&self.plan);
-        let from = vehicle_part(&self.problem.x_0);
-        // In the middle of the stage before, as the plan goes on from there.
-        let v_x = 1.5 * self.schedule.x[0][V_X] - 0.5 * self.schedule.x[1][V_X];
-        let before = Before { v_x, disturbance: guide.disturbance_before() };
-        let mut ideal = FeedForward::new(body, hold.step, &from, self.past, before);
-        for (i, stage) in self.problem.stages.iter_mut().enumerate() {
-            let at = middle(&self.schedule.x[i], &self.schedule.x[i + 1], &self.schedule.u[i], body);
-            let path = guide.advance(|kappa| at.progress(kappa));
-            self.tyres[i] = tyres.at(&at.x, &at.u, path.mu);
-            if i as f64 * hold.step < SOON {
-                self.fastest = self.fastest.max(path.wanted);
-            }
-            self.permitted = self.permitted.max(path.permitted);
-            linearise(&at, &path, &self.tyres[i], &around, stage.into());
-            self.increments[i] = ideal.advance(at.x[V_X], &path, &self.tyres[i]);
-            if let Some(recovery) = recovery {
-                let (e_y, e_psi) = recovery.at(i, path.v_x);
-                stage.x_ref[E_Y] += e_y;
-                stage.x_ref[E_PSI] += e_psi;
-            }
-        }
-        self.next = ideal.executable(&mut self.increments, hold.decay[DELTA], self.problem.du_max[DELTA]);
-        // The way back from far off the path is another one.
-        let share = recovery.map_or(1.0, |recovery| recovery.path);
-        for (stage, increment) in self.problem.stages.iter_mut().zip(&self.increments) {
-            stage.du_ref[DELTA] = share * increment;
-        }
-    }
-
     /// Down the ladder of solvers; `true` when there is an optimal plan.
     fn solve(&mut self) -> bool {
         if self.backend == Backend::Structured {
@@ -304,26 +251,6 @@ impl<const N_X: usize> Mpc<N_X> {
         }
         self.clarabel.solve(&self.problem, &mut self.solution);
         self.solution.outcome.is_solved()
-    }
-}
-
-/// [`Mpc::model`] with its arguments.
-struct Modelling<'a, const N_X: usize, M> {
-    mpc: &'a mut Mpc<N_X>,
-    guide: Guide<'a, f64>,
-    recovery: Option<&'a Recovery>,
-    hold: &'a Hold,
-    body: &'a Body,
-    tyres: &'a mut M,
-}
-
-impl<const N_X: usize, M: TyreModel> Work for Modelling<'_, N_X, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { mpc, guide, recovery, hold, body, tyres } = self;
-        mpc.model((guide, recovery), hold, body, tyres);
     }
 }
 

@@ -1,7 +1,5 @@
 //! The controller as its importer sees it: measurements in, commands out, one communication step at a time.
 
-use std::borrow::Cow;
-
 use serde::{Deserialize, Serialize};
 
 use crate::adaptation::Adapter;
@@ -11,7 +9,6 @@ use crate::hold::Hold;
 use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
-use crate::lanes::{Work, widest};
 use crate::latency::Latency;
 use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
 use crate::modes::{Adaptation, Estimation};
@@ -23,8 +20,7 @@ use crate::signals::{Inputs, Output};
 use crate::trend::Trend;
 use crate::{Error, Parameters};
 
-/// Fraction of a period by which times may differ and still be one: importers add up steps in floating point.
-const SAME_SAMPLE: f64 = 1e-6;
+mod steps;
 
 /// The predictive controller in the dimension that the actuators ask for.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -49,23 +45,6 @@ struct Beliefs {
     tyres: Adapter,
     /// Period and lags of the prediction model.
     hold: Hold,
-}
-
-/// [`Controller::sample`] with its arguments.
-struct Sampling<'a> {
-    controller: &'a mut Controller,
-    t: f64,
-    h: f64,
-    inputs: &'a Inputs,
-}
-
-impl Work for Sampling<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.controller.sample(self.t, self.h, self.inputs);
-    }
 }
 
 /// Adaptive LPV-MPC of steering and speed.
@@ -170,56 +149,6 @@ impl Controller {
     /// What is visible now.
     pub fn output(&self) -> &Output {
         &self.output
-    }
-
-    /// One communication step from time `t` [s] over `h` [s], with what was measured at `t`.
-    ///
-    /// Takes every sample that falls into the step. The command of the last one is visible afterwards, at `t + h`, and the
-    /// plan is made for that moment (and the actuators' delay).
-    ///
-    /// # Errors
-    /// [`Error::Step`] for a step that is not positive and finite, [`Error::Time`] for a time that is not finite; the controller
-    /// is as before then.
-    pub fn advance(&mut self, t: f64, h: f64, inputs: &Inputs) -> Result<(), Error> {
-        self.advance_with(t, h, |_| (0.0, Cow::Borrowed(inputs)))
-    }
-
-    /// Like [`advance`](Self::advance), with inputs that change at `rates` (each per second) within the step: a sample inside
-    /// the step then sees what is measured at its own time.
-    ///
-    /// # Errors
-    /// See [`advance`](Self::advance).
-    pub fn advance_along(&mut self, t: f64, h: f64, inputs: &Inputs, rates: &Inputs) -> Result<(), Error> {
-        self.advance_with(t, h, |age| (age, Cow::Owned(inputs.moved(rates, age))))
-    }
-
-    /// Takes the samples of a step; `measure` says, for a time since the start of the step [s], how long after the start the
-    /// measurement that the sample uses is taken [s], and what it is.
-    fn advance_with<'a>(
-        &mut self,
-        t: f64,
-        h: f64,
-        measure: impl Fn(f64) -> (f64, Cow<'a, Inputs>),
-    ) -> Result<(), Error> {
-        if !(h > 0.0 && h.is_finite()) {
-            return Err(Error::Step(h));
-        }
-        if !t.is_finite() {
-            return Err(Error::Time(t));
-        }
-        self.sampled = 0;
-        let end = t + h - SAME_SAMPLE * self.parameters.t_s.min(h);
-        loop {
-            let due = self.start + self.samples as f64 * self.parameters.t_s;
-            if due >= end {
-                return Ok(());
-            }
-            self.samples += 1;
-            self.sampled += 1;
-            let (age, inputs) = measure((due - t).max(0.0));
-            widest(Sampling { controller: self, t: t + age, h: h - age, inputs: &inputs });
-            self.latency.send(t + h, self.u_prev);
-        }
     }
 
     /// One sample with what was measured at `t` [s], whose command is visible after `h` [s]: estimate, predict over the
