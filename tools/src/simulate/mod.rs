@@ -1,5 +1,6 @@
 //! `cargo fmu simulate`: the closed loop on the cores, at any step, on any road.
 
+pub mod bends;
 pub mod journey;
 pub mod native;
 pub mod settings;
@@ -19,6 +20,7 @@ use crate::parameter_set::ParameterSet;
 use crate::plots::page;
 use crate::recording::{PAPER, Recording, Tracking, tracking_table};
 use crate::workspace::shown;
+use bends::Bends;
 use journey::Progress;
 use settings::Settings;
 
@@ -100,6 +102,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let (mut plant, mut controller) = build(&settings)?;
     journey::possible(&plant, args.step, args.stop)?;
+    let foreseen = foreseen(args, &settings, &plant)?;
+    if !foreseen.is_empty() {
+        output.line(&format!("{}\n", foreseen.join("\n")));
+    }
     let begin = Instant::now();
     let recording = drive(&mut plant, &mut controller, args, output)?;
     summary(args, &settings, &recording, begin.elapsed().as_secs_f64(), output);
@@ -111,6 +117,21 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.line(&remark);
     }
     save(args, &settings, &recording, output)
+}
+
+/// What can be said of a run before it begins: a bend that is sharper than the car.
+///
+/// # Errors
+/// If such a bend cannot be driven at all, and the end of the road is wanted.
+fn foreseen(args: &Args, settings: &Settings, plant: &Vehicle) -> Result<Vec<String>> {
+    let mut remarks = Vec::new();
+    if let Some(bends) = Bends::of(plant, settings.controller.delta_max) {
+        if args.stop.is_none() {
+            bends.possible()?;
+        }
+        remarks.push(format!("Sharper than the car: {bends}."));
+    }
+    Ok(remarks)
 }
 
 /// Drives with a bar; a car that makes no progress is given up unless the end is set by time.
@@ -173,7 +194,8 @@ fn list(rows: &[Vec<String>]) -> Vec<String> {
 fn road(name: &str, parameters: &vehicle::Parameters) -> Result<Road> {
     let file = Path::new(name);
     if file.is_file() {
-        return Road::from_csv(&read_text(file)?).with_context(|| format!("in {name}"));
+        return Road::from_csv_within(&read_text(file)?, parameters.road_tolerance)
+            .with_context(|| format!("in {name}"));
     }
     if NAMES.contains(&name) {
         return Ok(Road::named(name, parameters)?);
