@@ -4,6 +4,7 @@ pub mod bends;
 pub mod journey;
 pub mod native;
 pub mod settings;
+mod unused;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -73,7 +74,8 @@ fn road_help() -> String {
 }
 
 impl Args {
-    fn settings(&self) -> Result<Settings> {
+    /// The parameters of the file and those that are typed.
+    fn assignments(&self) -> Result<Vec<String>> {
         let mut assignments = Vec::new();
         if let Some(file) = &self.parameters {
             let set = ParameterSet::parse(&read_text(file)?).with_context(|| {
@@ -83,13 +85,14 @@ impl Args {
         }
         // The last assignment of a name holds: what is typed goes before what is read.
         assignments.extend_from_slice(&self.set);
-        Settings::new(&self.road, &assignments)
+        Ok(assignments)
     }
 }
 
 /// Runs the command.
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let settings = args.settings()?;
+    let assignments = args.assignments()?;
+    let settings = Settings::new(&args.road, &assignments)?;
     if args.list {
         for line in list(&settings.described()?) {
             output.line(&line);
@@ -102,7 +105,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let (mut plant, mut controller) = build(&settings)?;
     journey::possible(&plant, args.step, args.stop)?;
-    let foreseen = foreseen(args, &settings, &plant)?;
+    let foreseen = foreseen(args, &settings, &assignments, &plant)?;
     if !foreseen.is_empty() {
         output.line(&format!("{}\n", foreseen.join("\n")));
     }
@@ -119,12 +122,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     save(args, &settings, &recording, output)
 }
 
-/// What can be said of a run before it begins: a bend that is sharper than the car.
+/// What can be said of a run before it begins: what is set and does nothing, and a bend that is sharper than the car.
 ///
 /// # Errors
 /// If such a bend cannot be driven at all, and the end of the road is wanted.
-fn foreseen(args: &Args, settings: &Settings, plant: &Vehicle) -> Result<Vec<String>> {
-    let mut remarks = Vec::new();
+fn foreseen(args: &Args, settings: &Settings, assignments: &[String], plant: &Vehicle) -> Result<Vec<String>> {
+    let mut remarks = unused::remarks(settings, plant.road(), assignments)?;
     if let Some(bends) = Bends::of(plant, settings.controller.delta_max) {
         if args.stop.is_none() {
             bends.possible()?;
