@@ -19,6 +19,8 @@ a { color: var(--accent); }
 .lead, .note { color: var(--soft); }
 .note { font-size: .9rem; }
 .wide { overflow-x: auto; }
+.wide td:first-child, .wide th:first-child { position: sticky; left: 0; background: var(--paper); }
+.wide td:first-child:not(.number) { min-width: 6.5rem; }
 table { border-collapse: collapse; font-size: .92rem; }
 th, td { text-align: left; vertical-align: top; padding: .35rem .8rem .35rem 0; border-bottom: 1px solid var(--rule); }
 th { color: var(--soft); font-weight: 600; }

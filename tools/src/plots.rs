@@ -70,7 +70,7 @@ impl Curve {
 fn thinned(x: &[f64], y: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
     let length = (2 * y.len()).div_ceil(POINTS);
     if length <= 2 {
-        return (x.iter().map(|x| digits(*x)).collect(), y.into_iter().map(digits).collect());
+        return (rounded(x.to_vec()), rounded(y));
     }
     let (mut xs, mut ys) = (Vec::with_capacity(POINTS + 2), Vec::with_capacity(POINTS + 2));
     for (x, y) in x.chunks(length).zip(y.chunks(length)) {
@@ -79,16 +79,23 @@ fn thinned(x: &[f64], y: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
         };
         let (low, high) = (pick(|a, b| a < b), pick(|a, b| a > b));
         for i in if low == high { vec![low] } else { vec![low.min(high), low.max(high)] } {
-            xs.push(digits(x[i]));
-            ys.push(digits(y[i]));
+            xs.push(x[i]);
+            ys.push(y[i]);
         }
     }
-    (xs, ys)
+    (rounded(xs), rounded(ys))
 }
 
-/// Six significant digits: finer than any screen, and a third of the page's size.
-fn digits(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
+/// Six significant digits: finer than any screen, and a third of the page's size. Where values lie close together, as a speed
+/// that is held, up to nine: the browser zooms in on what differs, and would show the steps.
+fn rounded(values: Vec<f64>) -> Vec<f64> {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let largest = finite().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let span = finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min);
+    let more = if span > 0.0 { (largest / span).log10().ceil().clamp(0.0, 3.0) } else { 0.0 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "5 to 8")]
+    let digits = 5 + more as usize;
+    values.into_iter().map(|value| format!("{value:.digits$e}").parse().unwrap_or(value)).collect()
 }
 
 /// A plot with its place on the page.
@@ -199,6 +206,13 @@ mod tests {
         assert!(xs.len() <= POINTS + 2 && xs.is_sorted());
         let at = |value: f64| ys.iter().position(|y| *y == value).map(|i| xs[i]);
         assert_eq!((at(5.0), at(-7.0)), (Some(123.0), Some(77_777.0)));
+    }
+
+    #[test]
+    fn digits_go_by_what_differs() {
+        assert_eq!(rounded(vec![0.0, 14.123_456_789]), [0.0, 14.1235]);
+        assert_eq!(rounded(vec![14.0, 14.000_123_456, f64::NAN])[1], 14.000_123_5);
+        assert_eq!(rounded(vec![14.123_456_789; 2]), [14.1235; 2]);
     }
 
     #[test]

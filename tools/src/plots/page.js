@@ -31,7 +31,8 @@ function draw(id) {
   const soft = css.getPropertyValue('--soft').trim();
   // With automargin, a title that keeps its distance moves the margin instead of running into the numbers.
   const axis = old => ({...old, title: {...old.title, standoff: 10}, gridcolor: rule, zerolinecolor: rule, linecolor: rule, automargin: true,
-    ...(old.type === 'log' ? {exponentformat: 'power'} : {})});
+    // Few marks: with more, Plotly writes lone digits from 1 to 9 beside each other.
+    ...(old.type === 'log' ? {exponentformat: 'power', nticks: 4} : {})});
   const layout = {...plot.layout, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', font: {color: ink},
     modebar: {bgcolor: 'rgba(0,0,0,0)', color: soft, activecolor: ink},
     // Below everything else, however many lines the names take on a narrow screen.

@@ -1,8 +1,10 @@
 //! `cargo fmu simulate`: the closed loop on the cores, at any step, on any road.
 
+pub mod bends;
 pub mod journey;
 pub mod native;
 pub mod settings;
+mod unused;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,6 +21,7 @@ use crate::parameter_set::ParameterSet;
 use crate::plots::page;
 use crate::recording::{PAPER, Recording, Tracking, tracking_table};
 use crate::workspace::shown;
+use bends::Bends;
 use journey::Progress;
 use settings::Settings;
 
@@ -71,7 +74,8 @@ fn road_help() -> String {
 }
 
 impl Args {
-    fn settings(&self) -> Result<Settings> {
+    /// The parameters of the file and those that are typed.
+    fn assignments(&self) -> Result<Vec<String>> {
         let mut assignments = Vec::new();
         if let Some(file) = &self.parameters {
             let set = ParameterSet::parse(&read_text(file)?).with_context(|| {
@@ -81,13 +85,14 @@ impl Args {
         }
         // The last assignment of a name holds: what is typed goes before what is read.
         assignments.extend_from_slice(&self.set);
-        Settings::new(&self.road, &assignments)
+        Ok(assignments)
     }
 }
 
 /// Runs the command.
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let settings = args.settings()?;
+    let assignments = args.assignments()?;
+    let settings = Settings::new(&args.road, &assignments)?;
     if args.list {
         for line in list(&settings.described()?) {
             output.line(&line);
@@ -100,6 +105,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let (mut plant, mut controller) = build(&settings)?;
     journey::possible(&plant, args.step, args.stop)?;
+    let foreseen = foreseen(args, &settings, &assignments, &plant)?;
+    if !foreseen.is_empty() {
+        output.line(&format!("{}\n", foreseen.join("\n")));
+    }
     let begin = Instant::now();
     let recording = drive(&mut plant, &mut controller, args, output)?;
     summary(args, &settings, &recording, begin.elapsed().as_secs_f64(), output);
@@ -111,6 +120,21 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.line(&remark);
     }
     save(args, &settings, &recording, output)
+}
+
+/// What can be said of a run before it begins: what is set and does nothing, and a bend that is sharper than the car.
+///
+/// # Errors
+/// If such a bend cannot be driven at all, and the end of the road is wanted.
+fn foreseen(args: &Args, settings: &Settings, assignments: &[String], plant: &Vehicle) -> Result<Vec<String>> {
+    let mut remarks = unused::remarks(settings, plant.road(), assignments)?;
+    if let Some(bends) = Bends::of(plant, settings.controller.delta_max) {
+        if args.stop.is_none() {
+            bends.possible()?;
+        }
+        remarks.push(format!("Sharper than the car: {bends}."));
+    }
+    Ok(remarks)
 }
 
 /// Drives with a bar; a car that makes no progress is given up unless the end is set by time.
@@ -173,7 +197,8 @@ fn list(rows: &[Vec<String>]) -> Vec<String> {
 fn road(name: &str, parameters: &vehicle::Parameters) -> Result<Road> {
     let file = Path::new(name);
     if file.is_file() {
-        return Road::from_csv(&read_text(file)?).with_context(|| format!("in {name}"));
+        return Road::from_csv_within(&read_text(file)?, parameters.road_tolerance)
+            .with_context(|| format!("in {name}"));
     }
     if NAMES.contains(&name) {
         return Ok(Road::named(name, parameters)?);

@@ -94,6 +94,11 @@ impl Settings {
     }
 }
 
+/// Unit of a parameter of one side, if it has one.
+pub fn unit(side: &str, name: &str) -> Option<String> {
+    Described::read().ok()?.find(side, name)?.unit.clone()
+}
+
 /// Share of the letters from which on two names are alike: with less, a suggestion is farther from what was meant than none.
 const ALIKE: f64 = 0.6;
 

@@ -10,6 +10,12 @@ use super::score;
 use crate::html::{escape, table};
 use crate::plots::{BLUE, Chart, Curve, GREEN, ORANGE, RED, assemble, chart};
 
+/// Units of the columns of [`HEAD`].
+const UNITS: [&str; HEAD.len()] = {
+    let (stiffness, force) = (" [kN/rad]", " [%]");
+    ["", "", "", stiffness, stiffness, stiffness, stiffness, force, force, force, force]
+};
+
 /// Stands for the charts' names in the page's script, one for each class.
 const IDS: [&str; 6] = ["class_a", "class_b", "class_c", "class_d", "class_e", "class_f"];
 
@@ -36,17 +42,23 @@ pub fn scores(report: &Report, held_out: &[Run], network: &Network) -> String {
 }
 
 fn whole(title: &str, report: &Report, held_out: &[Run], network: &Network, mut charts: Vec<Chart>) -> String {
-    let head: Vec<(&str, bool)> = HEAD.iter().enumerate().map(|(i, name)| (*name, i > 0)).collect();
+    let names: Vec<String> = HEAD.iter().zip(UNITS).map(|(name, unit)| format!("{name}{unit}")).collect();
+    let head: Vec<(&str, bool)> = names.iter().enumerate().map(|(i, name)| (name.as_str(), i > 0)).collect();
     let mut above = String::new();
     let mut section = |title: &str, rows: Vec<Vec<String>>| {
         let cells: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| escape(cell)).collect()).collect();
         above.push_str(&format!("<h2>{}</h2>\n{}", escape(title), table(&head, &cells)));
     };
     for set in &report.sets {
-        section(set.name, set.rows.iter().map(|(name, score)| row(name, score)).collect());
+        // Sets are named one below the other: the second goes on where the first ends.
+        let name = if set.name == "beyond" { "beyond 90 % of grip" } else { set.name };
+        section(
+            &format!("Held-out manoeuvres {name}"),
+            set.rows.iter().map(|(name, score)| row(name, score)).collect(),
+        );
     }
     section(
-        "Parts of the standard set, free-running",
+        "Parts of those within 90 % of grip, free-running",
         report.bands.iter().map(|(name, score)| row(name, score)).collect(),
     );
     for (class, id) in Class::ALL.into_iter().zip(IDS) {
@@ -58,10 +70,12 @@ fn whole(title: &str, report: &Report, held_out: &[Run], network: &Network, mut 
         );
     }
     let made = &network.document().provenance;
+    let [lowest, highest] = made.mu;
+    let friction = if lowest == highest { lowest.to_string() } else { format!("{lowest} to {highest}") };
     let lead = format!(
-        "Tyre {}, friction {} to {}. {}. Manoeuvres that took no part in the training. \
-         Errors of the stiffness (RMSE, worst) in kN/rad, of the force (rms, worst) in % of the axle's grip.",
-        made.tyre, made.mu[0], made.mu[1], made.recipe
+        "Tyre {}, friction {friction}; {}. The manoeuvres took no part in the training. RMSE and worst are errors of the \
+         stiffness, force is the rms error of the lateral force over the axle's grip.",
+        made.tyre, made.recipe
     );
     assemble(title, &lead, &above, &charts)
 }

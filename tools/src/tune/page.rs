@@ -5,6 +5,7 @@ use crate::html::{escape, table};
 use crate::optimise::Candidate;
 use crate::optimise::search::Progress;
 use crate::plots::{BLUE, Chart, Curve, GREY, ORANGE, assemble, chart};
+use crate::simulate::settings;
 
 /// The page.
 pub fn of(tuning: &Checkpoint, verdict: &Verdict) -> String {
@@ -22,13 +23,25 @@ pub fn of(tuning: &Checkpoint, verdict: &Verdict) -> String {
         setup.seed
     );
     let mut above = String::new();
-    for (title, rows) in [("Parameters", parameter_rows(tuning, verdict)), ("Before and after", figure_rows(verdict))] {
+    let mut parameters = parameter_rows(tuning, verdict);
+    for row in &mut parameters[1..] {
+        row[0] = with_unit(&row[0]);
+    }
+    for (title, rows) in [("Parameters", parameters), ("Before and after", figure_rows(verdict))] {
         above.push_str(&format!("<h2>{title}</h2>\n{}", html_table(&rows)));
     }
     let mut charts = vec![convergence(tuning)];
     charts.extend(spread(tuning));
     charts.extend(pictures(verdict));
     assemble("Tuning", &lead, &above, &charts)
+}
+
+/// A parameter of the controller with its unit, where it has one.
+fn with_unit(name: &str) -> String {
+    match settings::unit("controller", name).as_deref() {
+        None | Some("1") => name.to_owned(),
+        Some(unit) => format!("{name} [{unit}]"),
+    }
 }
 
 /// Rows as a table of the page, the first one its head.
@@ -83,7 +96,7 @@ fn spread(tuning: &Checkpoint) -> Vec<Chart> {
                     &format!("Values of {}", side.name),
                     "The best tenth of all candidates in their order.",
                 ],
-                ["evaluation", &side.name],
+                ["evaluation", &with_unit(&side.name)],
                 vec![Curve::new("candidates", &x, y, ORANGE).points()],
             );
             if side.logarithmic { drawn.log_y() } else { drawn }
@@ -110,7 +123,8 @@ fn pictures(verdict: &Verdict) -> Vec<Chart> {
             charts.push(chart(
                 [&format!("{id}_{column}"), &format!("{title}: {what}"), ""],
                 ["time [s]", what],
-                vec![curve("before", &before, GREY), curve("after", &after, BLUE)],
+                // One over the other in places, so that both must be seen.
+                vec![curve("before", &before, ORANGE), curve("after", &after, BLUE).dashed()],
             ));
         }
     }
