@@ -48,7 +48,7 @@ pub fn run(_args: &Args, output: &Output) -> Result<()> {
     }
     let file = archive_folder().join("demo.html");
     let lead = "The controller FMU drives the plant FMU through a double lane change at 14 m/s; both were loaded from their packed \
-                archives and exchanged values every millisecond.";
+                archives. The plots show the run in which they exchanged values every millisecond.";
     let picture = shown_run.thinned(shown_run.rows.len() / 1500);
     write_whole(&file, page("Double lane change", lead, &picture, &runs).as_bytes())?;
     closing(&packed, &shown(&file), output);
