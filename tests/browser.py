@@ -141,7 +141,8 @@ def browse():
         profile = pathlib.Path(profile)
         # Into a file: a pipe that nobody reads would stop the browser when it is full.
         with open(profile / "complaints.txt", "w") as complaints:
-            program = subprocess.Popen([chromium(), *FLAGS, f"--user-data-dir={profile}", "about:blank"], stderr=complaints)
+            command = [chromium(), *FLAGS, f"--user-data-dir={profile}", "about:blank"]
+            program = subprocess.Popen(command, stderr=complaints, env=os.environ | {"TMPDIR": str(profile)})
         try:
             address = _address(program, profile)
             browser = websocket.create_connection(address, timeout=PATIENCE)
