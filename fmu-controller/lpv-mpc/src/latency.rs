@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::hold::decay;
-use crate::model::{Body, Input, NU, Point, State, Tyres, V_X, fastest_rate};
+use crate::lateness::LATE_MAX;
+use crate::model::{Body, DELTA, Input, NU, Point, State, Tyres, V_X, fastest_rate};
 use crate::trend::Trend;
 
 /// Largest product of an integration step and the rate of the fastest mode [1]: a step then leaves 0.5^5 / 5! = 3e-4 of
@@ -27,6 +28,8 @@ const SAME_TIME: f64 = 1e-9;
 pub struct Latency {
     /// Delay of the actuators [s].
     delay: f64,
+    /// How much later than that the steering acts [s].
+    late: f64,
     /// Time constants of the actuators [s].
     tau: [f64; NU],
     /// Commands and the times at which they begin to act, oldest first [s].
@@ -54,17 +57,28 @@ impl Latency {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a delay of at most 1 s in periods"
+            reason = "a delay of at most 1.15 s in periods"
         )]
-        let on_their_way = (delay / period).ceil() as usize;
+        let on_their_way = ((delay + LATE_MAX) / period).ceil() as usize;
         Self {
             delay,
+            late: 0.0,
             tau,
             // One acts, one has just been given, one rounds.
             commands: Vec::with_capacity(on_their_way + 3),
             actual: Input::zeros(),
             time: start,
         }
+    }
+
+    /// From now on the steering acts `late` [s] after its delay, at most [`LATE_MAX`].
+    pub fn set_late(&mut self, late: f64) {
+        self.late = late;
+    }
+
+    /// Time from a measurement until the command that it leads to acts, when it becomes visible after `step` [s].
+    pub fn until_acting(&self, step: f64) -> f64 {
+        step + self.delay + self.late
     }
 
     /// A command becomes visible at time `t` [s].
@@ -86,21 +100,38 @@ impl Latency {
         let mut sum = Input::zeros();
         let mut now = self.time;
         while now < t - SAME_TIME {
-            let (command, until) = self.acting(now);
+            let (command, until) = self.acting(now, f64::INFINITY);
             let next = until.min(t);
             sum += lag_integral(&self.actual, &command, next - now, &self.tau);
             self.actual = lag(&self.actual, &command, next - now, &self.tau);
             now = next;
         }
         self.time = t;
-        let acting = self.commands.iter().rposition(|(acts, _)| *acts <= t + SAME_TIME);
+        let acting = self.commands.iter().rposition(|(acts, _)| *acts <= t - LATE_MAX + SAME_TIME);
         self.commands.drain(..acting.unwrap_or(0));
         let mean = if now > t - duration { sum / duration } else { self.actual };
         (duration, mean)
     }
 
-    /// The command that acts at time `t` [s] and the time at which the next one takes over [s].
-    fn acting(&self, t: f64) -> (Input, f64) {
+    /// What acts at time `t` [s] and the time at which something else takes over [s], of the commands that are due before the time
+    /// `known` [s].
+    fn acting(&self, t: f64, known: f64) -> (Input, f64) {
+        let (mut command, mut until) = if t < known - SAME_TIME {
+            let (command, until) = self.due(t);
+            (command, until.min(known))
+        } else {
+            (self.due(known - 2.0 * SAME_TIME).0, f64::INFINITY)
+        };
+        if self.late > 0.0 {
+            let (steering, next) = self.due(t - self.late);
+            command[DELTA] = steering[DELTA];
+            until = until.min(next + self.late);
+        }
+        (command, until)
+    }
+
+    /// The command that is due at time `t` [s] and the time at which the next one is [s].
+    fn due(&self, t: f64) -> (Input, f64) {
         let next = self.commands.partition_point(|(acts, _)| *acts <= t + SAME_TIME);
         let command = match next {
             0 => Input::zeros(),
@@ -122,12 +153,14 @@ impl Latency {
         tyres: &Tyres<T>,
         trend: &Trend<T>,
     ) -> Predicted<T> {
-        let end = self.time + step + self.delay;
+        // The next command is due before late steering acts; the drive is held until then, as it is not known yet.
+        let known = self.time + step + self.delay;
+        let end = known + self.late;
         let rate = fastest_rate(x[V_X].re(), body, tyres).min(STEPS_MAX * STEP_RATE_MAX / (end - self.time));
         let mut at = Predicted { x: *x, distance: T::zero(), actual: self.actual };
         let mut now = self.time;
         while now < end - SAME_TIME {
-            let (command, until) = self.acting(now);
+            let (command, until) = self.acting(now, known);
             let piece = until.min(end) - now;
             let steps = (piece * rate / STEP_RATE_MAX).ceil().max(1.0);
             let h = piece / steps;
@@ -208,12 +241,39 @@ mod tests {
     fn a_delay_shifts_when_commands_act() {
         let mut latency = Latency::new(0.0, 0.05, [0.0; 2], 0.033);
         latency.send(0.001, Input::from([0.1, 1.0]));
-        assert_eq!(latency.acting(0.050).0, Input::zeros());
-        assert_eq!(latency.acting(0.051).0, Input::from([0.1, 1.0]));
+        let acting = |latency: &Latency, t| latency.acting(t, f64::INFINITY).0;
+        assert_eq!(acting(&latency, 0.050), Input::zeros());
+        assert_eq!(acting(&latency, 0.051), Input::from([0.1, 1.0]));
         latency.send(0.034, Input::from([0.2, 2.0]));
         latency.advance(0.09);
-        assert_eq!(latency.acting(0.09).0, Input::from([0.2, 2.0]));
+        assert_eq!(acting(&latency, 0.09), Input::from([0.2, 2.0]));
+        // The steering may be late.
+        assert_eq!(latency.commands.len(), 2);
+        latency.advance(0.09 + LATE_MAX);
         assert_eq!(latency.commands.len(), 1);
+    }
+
+    #[test]
+    fn late_steering_acts_later_and_the_drive_does_not() {
+        let mut latency = Latency::new(0.0, 0.05, [0.0; 2], 0.033);
+        latency.send(0.0, Input::from([0.1, 1.0]));
+        latency.send(0.033, Input::from([0.2, 2.0]));
+        latency.set_late(0.04);
+        let acting = |t| latency.acting(t, f64::INFINITY);
+        assert_eq!(acting(0.045), (Input::zeros(), 0.05));
+        for (t, command, until) in [(0.06, [0.0, 1.0], 0.083), (0.085, [0.0, 2.0], 0.09), (0.1, [0.1, 2.0], 0.123)] {
+            assert_eq!(acting(t).0, Input::from(command), "{t}");
+            assert!((acting(t).1 - until).abs() < 1e-15, "{t}: {}", acting(t).1);
+        }
+        assert_eq!(acting(0.13), (Input::from([0.2, 2.0]), f64::INFINITY));
+        assert_eq!(latency.until_acting(0.033), 0.033 + 0.05 + 0.04);
+        // What is due at 0.083 s is not known before: until the plan begins the drive is held.
+        assert_eq!(latency.acting(0.06, 0.083), (Input::from([0.0, 1.0]), 0.083));
+        assert_eq!(latency.acting(0.1, 0.083).0, Input::from([0.1, 1.0]));
+        // Between 0.05 and 0.15 s: 40 ms at 0, 33 ms at 0.1 and 27 ms at 0.2 rad; 33 ms at 1 and 67 ms at 2 m/s2.
+        latency.advance(0.05);
+        let (_, mean) = latency.advance(0.15);
+        assert!((mean - Input::from([0.087, 1.67])).norm() < 1e-12, "{mean}");
     }
 
     #[test]

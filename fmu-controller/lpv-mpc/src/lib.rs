@@ -44,6 +44,7 @@ pub mod jordan;
 mod ladder;
 mod lanes;
 pub mod latency;
+mod lateness;
 pub mod model;
 mod modes;
 pub mod mpc;

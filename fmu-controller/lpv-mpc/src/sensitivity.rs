@@ -104,7 +104,7 @@ pub(crate) fn along<const N_X: usize>(
         None => fixed(&snapshot.tyres[1]),
     };
     let at = latency.predict(&x, snapshot.step, |s| road.curvature(s), body, &present, &trend);
-    let since = snapshot.step + p.input_delay;
+    let since = latency.until_acting(snapshot.step);
     let mut guide = Guide::new(&road, &at, &mpc.problem.u_prev, since, (p, body, hold), &trend);
     let around = Surroundings { nominal: adapter.nominal(), hold };
 

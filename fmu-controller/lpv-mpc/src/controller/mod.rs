@@ -10,7 +10,10 @@ use crate::horizon::{NX_LAGS, vehicle_part};
 use crate::jordan::Network;
 use crate::ladder::{Status, safe_stop};
 use crate::latency::Latency;
-use crate::model::{A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_X, V_Y};
+use crate::lateness::Lateness;
+use crate::model::{
+    A_X, Body, DELTA, Disturbance, E_PSI, E_Y, Input, NU, NX, State, Tyres, V_GUARD, V_X, V_Y, YAW_RATE,
+};
 use crate::modes::{Adaptation, Estimation};
 use crate::mpc::Mpc;
 use crate::qp::Problem;
@@ -54,6 +57,7 @@ pub struct Controller {
     beliefs: Beliefs,
     core: Core,
     latency: Latency,
+    lateness: Lateness,
     estimator: Estimator,
     /// Samples since speed and position on the path were last measured.
     blind: usize,
@@ -105,6 +109,7 @@ impl Controller {
                 Core::Lags(Box::new(Mpc::new(p)))
             },
             latency: Latency::new(start, p.input_delay, tau, p.t_s),
+            lateness: Lateness::new(),
             start,
             samples: 0,
             u_prev: Input::zeros(),
@@ -159,8 +164,14 @@ impl Controller {
         // Tyres are judged by what was measured, not by what was made up for it.
         let is_known = self.output.status < Status::Estimated && self.estimator.is_settled();
         if self.parameters.estimation == Estimation::Kalman && is_known {
-            let Self { beliefs: Beliefs { body, tyres, .. }, estimator, snapshot, .. } = self;
+            let Self { beliefs: Beliefs { body, tyres, .. }, estimator, snapshot, latency, lateness, .. } = self;
             tyres.learn(&estimator.x, &snapshot.delivered, &mut estimator.trend.now, duration, body);
+            // What the tyres do not explain.
+            if self.parameters.adaptation != Adaptation::Constant && estimator.x[V_X] > V_GUARD && duration > 0.0 {
+                let gives = tyres.present().c_f * body.l_f / body.i_z;
+                lateness.learn(snapshot.delivered[DELTA], gives, estimator.trend.now[YAW_RATE], duration);
+                latency.set_late(lateness.seconds());
+            }
         }
         (self.snapshot.inputs, self.snapshot.estimator) = (*inputs, self.estimator);
         (self.snapshot.duration, self.snapshot.delivered, self.snapshot.step) = (duration, delivered, h);
@@ -172,7 +183,7 @@ impl Controller {
         self.snapshot.tyres[1] = *tyres.present();
         let at = latency.predict(&x, h, |s| road.curvature(s), body, tyres.present(), &trend);
         let u_prev = self.u_prev;
-        let guide = Guide::new(&road, &at, &u_prev, h + p.input_delay, (p, body, hold), &trend);
+        let guide = Guide::new(&road, &at, &u_prev, latency.until_acting(h), (p, body, hold), &trend);
         let recovery = Recovery::new(&at, road.friction(at.distance), p);
         let guide = recovery.iter().fold(guide, |guide, recovery| guide.no_faster_than(recovery.pace));
         let sighted = self.blind < p.horizon && (p.estimation == Estimation::Measured || self.estimator.is_started());

@@ -5,6 +5,8 @@ use crate::robustness::scenario::Scenario;
 
 /// Speed of the lane change [m/s].
 const SPEED: f64 = 14.0;
+/// Speeds of the lane change up to the limit of grip [m/s].
+const FAST: [f64; 3] = [14.0, 15.0, 17.0];
 /// How far the assumed delay is off [s].
 const WRONG: f64 = 0.02;
 
@@ -36,6 +38,18 @@ pub(super) fn cases() -> Vec<Case> {
             })
             .collect()
     };
+    let untold = |scenario: Scenario, name: &str, lag: f64| {
+        scenario.with(&[("plant.tau_delta", lag)]).called(format!("{name}, {:.0} ms", 1e3 * lag))
+    };
+    let late_untold = [0.05, 0.1, 0.15]
+        .into_iter()
+        .flat_map(|lag| {
+            let lane_changes = FAST.map(|speed| untold(Scenario::lane_change(speed), &format!("{speed} m/s"), lag));
+            let noisy = Scenario::lane_change(SPEED).with(&[("plant.noise_scale", 1.0)]);
+            let others = [untold(noisy, "noise", lag), untold(Scenario::on("general"), "general track", lag)];
+            lane_changes.into_iter().chain(others)
+        })
+        .collect();
     let gust = [("plant.speed", 25.0), ("plant.gust_speed", 20.0)];
     let case =
         |name, asked, limit, scenarios| Case { name, asked, limit: Some(limit), unit: CM, scenarios, measure: lateral };
@@ -50,6 +64,7 @@ pub(super) fn cases() -> Vec<Case> {
             vec![Scenario::lane_change(SPEED).slowed(0.3, 0.25, 0.25).called("told")],
         ),
         // The car must not be lost: half a metre is what a lane leaves on either side.
+        case("late_untold", "lane change and general track, lag 0.05 to 0.15 s, not told", 0.5, late_untold),
         case("fast_wrong", "general track to 25 m/s, delay 0.1 to 0.25 s, 20 ms wrong", 0.5, late("general", &[])),
         case("fast_gust", "gust of 20 m/s at 25 m/s, delay 0.1 to 0.25 s, 20 ms wrong", 0.5, late("straight", &gust)),
         // No more than ten of the position sensor's deviations: the car must not be lost to what it does not know.
