@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn a_run_that_leaves_its_road_says_so() {
         // An actuator that the controller does not know of.
-        let (run, way) = drive("double_lane_change", 0.001, &["plant.tau_delta=0.2", "plant.delay_delta=0.15"]);
+        let (run, way) = drive("double_lane_change", 0.001, &["plant.delta_rate_max=0.02"]);
         let said = remarks(&run, way, false).join("\n");
         assert!(said.contains("was not reached: given up at ") && said.contains(" m of 200 m after 28."), "{said}");
         assert!(said.contains("Off the road: the car was "), "{said}");
