@@ -125,7 +125,8 @@ impl Latency {
         if self.late > 0.0 {
             let (steering, next) = self.due(t - self.late);
             command[DELTA] = steering[DELTA];
-            until = until.min(next + self.late);
+            // At times of 1e9 s, as clocks have, the sum may round to no later than now.
+            until = until.min((next + self.late).max(t.next_up()));
         }
         (command, until)
     }
@@ -274,6 +275,23 @@ mod tests {
         latency.advance(0.05);
         let (_, mean) = latency.advance(0.15);
         assert!((mean - Input::from([0.087, 1.67])).norm() < 1e-12, "{mean}");
+    }
+
+    #[test]
+    fn late_steering_is_followed_at_the_times_of_clocks_too() {
+        let late_from = |start: f64| {
+            let mut latency = Latency::new(start, 0.05, [0.0; 2], 0.033);
+            for k in 0..9 {
+                let t = start + 0.033 * f64::from(k);
+                latency.advance(t);
+                latency.set_late(0.0123 * f64::from(k));
+                latency.send(t + 0.033, Input::from([0.01 * f64::from(k), 0.0]));
+            }
+            predict(&latency, 0.033).x
+        };
+        // Times have steps of 2.4e-7 s there, over which steering of 0.1 rad gives 1e-5 rad/s at most.
+        let difference = late_from(1.7e9) - late_from(0.0);
+        assert!(difference.norm() < 1e-4, "{difference}");
     }
 
     #[test]
